@@ -22,8 +22,8 @@ from pcii.evaluation.submission_checks import SUBMISSION
 from pcii.evaluation.tables import with_interval
 from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
-from pcii.store.collection_layout import IN_FRAMES
-from pcii.store.evaluation_layout import read_evaluation
+from pcii.store.collection import IN_FRAMES
+from pcii.store.folders import read_evaluation
 from simgen.dataset.benchmark_making import load_definition
 
 BENCHMARK = "pcii-bench-1"

@@ -3,7 +3,7 @@
 import shutil
 
 import simgen
-from pcii.store.sample_dataset import SAMPLE
+from pcii.store.dataset import SAMPLE
 from pcii.store.verification import verify
 
 LARGEST_BYTES = 2_000_000

@@ -22,9 +22,8 @@ from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.demosaicing import demosaic
 from pcii.sections.reconstruction import reconstruct, reconstruct_each
 from pcii.store.collection import Collection, open_collection
-from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset import Dataset, open_dataset, sample
 from pcii.store.dataset_writer import save_dataset
-from pcii.store.sample_dataset import sample
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.types.images import Views

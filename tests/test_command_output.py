@@ -19,7 +19,7 @@ from pcii.base.command_line import command_app
 from pcii.base.command_output import answer, answer_json, say, say_next
 from pcii.base.plain_text import UNSEEN
 from pcii.base.progress import Stages, is_quiet
-from pcii.store.sample_dataset import SAMPLE
+from pcii.store.dataset import SAMPLE
 from simgen.app import commands as simgen_cli
 
 APPS = (simgen_cli.app, pcii_cli.app)

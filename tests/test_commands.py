@@ -156,7 +156,6 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
         assert "above 0 mm" in said
     said = refusal(pcii_cli.app, ["run", data, "--z-mm", "540", "--z-mm", "0.62", "-o", out], capsys)
     assert "z_mm: 0.62 mm is so near that no views overlap" in said
-    assert "if metres are meant, it is 620" in said
     assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
     broken = tmp_path / "broken"
     shutil.copytree(small_dataset, broken)
@@ -217,7 +216,7 @@ def test_a_budget_that_is_not_there_is_refused(
     nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     command = ["depth", str(nested_dataset), "-o", str(tmp_path / "out"), "--budget", "31"]
-    assert "there are 400, 30, 120" in refusal(pcii_cli.app, command, capsys)
+    assert "there are 30, 120, 400" in refusal(pcii_cli.app, command, capsys)
     assert "budget" in refusal(pcii_cli.app, [*command[:-1], "few"], capsys)
     assert not (tmp_path / "out").exists()
 

@@ -1,4 +1,4 @@
-"""Disks that break, are read-only or full while a command runs: it says so, and nothing is lost."""
+"""Disks that break or are full while a command runs: it says so, and nothing is lost."""
 
 import json
 import random
@@ -16,10 +16,8 @@ from tiny import with_radiance
 
 from pcii.app import commands as pcii_commands
 from pcii.base import command_line
-from pcii.evaluation.rows import all_rows, key_of
 from pcii.store.dataset_layout import MANIFEST
-from pcii.store.hashes import hash_file
-from pcii.store.results_list import read_results
+from pcii.store.folders import ROWS, hash_file, read_results
 from pcii.store.verification import verify
 from simgen.app import commands as simgen_commands
 
@@ -28,13 +26,6 @@ DATASET = with_radiance(1).replace("seed = { range = [0, 1] }\n", "") + "[analys
 APPS = {"simgen": simgen_commands.app, "pcii": pcii_commands.app}
 SIZES = 10
 Content = dict[Any, Any]
-
-
-class Said(NamedTuple):
-    """How a command ended, and what it said on standard error."""
-
-    code: int
-    error: str
 
 
 class Work(NamedTuple):
@@ -46,27 +37,29 @@ class Work(NamedTuple):
     content: Callable[[Path], Content]
 
     def here(self, out: Path, command: list[str] | None = None) -> int:
-        """Run the command in this process."""
+        """Run the command in this process; its exit code."""
         return command_line.run(APPS[self.package], [*(command or self.command), "-o", str(out)])
 
-    def apart(self, out: Path) -> Said:
-        """Run the command in a process of its own."""
+    def apart(self, out: Path) -> tuple[int, str]:
+        """Run the command in a process of its own; its exit code and standard error."""
         main = f"from {self.package}.app.commands import main; raise SystemExit(main())"
         program = [sys.executable, "-c", main, *self.command, "-o", str(out)]
-        done = subprocess.run(program, text=True, capture_output=True, check=False)
-        return Said(done.returncode, done.stderr)
+        ended = subprocess.run(program, text=True, capture_output=True, check=False)
+        return ended.returncode, ended.stderr
 
 
 def results_of(out: Path) -> Content:
     """Hash of every listed file, but of the report, which tells the times."""
-    files = read_results(out)["files"]
-    return {name: hash_file(out / name) for name in files if name != "report.html"}
+    return {name: hash_file(out / name) for name in read_results(out).files if name != "report.html"}
 
 
 def rows_of(out: Path) -> Content:
-    """Every row, but for the time, by its key."""
-    with all_rows(out) as rows:
-        return {key_of(row): json.dumps(row | {"seconds": 0, "date": ""}) for row in rows}
+    """Every row, but for the time, by dataset, budget and method."""
+    rows = [json.loads(line) for line in (out / ROWS).read_bytes().split(b"\n")[:-1]]
+    return {
+        (row["identity"], row["budget"], row["method"]): json.dumps(row | {"seconds": 0, "date": ""})
+        for row in rows
+    }
 
 
 def datasets_of(out: Path) -> Content:
@@ -79,42 +72,33 @@ def works(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Work]:
     place = tmp_path_factory.mktemp("place")
     recipe, one = place / "one.toml", place / "one"
     recipe.write_text(DATASET)
-    generate, method = ["generate", str(recipe)], ["--method", "brightness"]
-    evaluate, run, segment = (
-        ["evaluate", str(one), *method],
-        ["run", str(one), *method],
-        ["segment", str(one)],
-    )
+    generate, method, other = ["generate", str(recipe)], ["--method", "brightness"], ["--method", "variance"]
+    evaluate, run = ["evaluate", str(one), *method], ["run", str(one), *method]
     assert command_line.run(APPS["simgen"], [*generate, "-o", str(one)]) == 0
-    other = ["--method", "variance"]
+    many = [*generate, "--seeds", "3", "--workers", "2"]
     return {
         "dataset": Work("simgen", [], generate, digest),
-        "collection": Work(
-            "simgen",
-            [[*generate, "--seeds", "1"]],
-            [*generate, "--seeds", "3", "--workers", "2"],
-            datasets_of,
-        ),
-        "results": Work("pcii", [[*segment, *other]], run, results_of),
+        "collection": Work("simgen", [[*generate, "--seeds", "1"]], many, datasets_of),
+        "results": Work("pcii", [], run, results_of),
         "evaluation": Work("pcii", [evaluate], [*evaluate, *other], rows_of),
     }
 
 
 class Folders:
-    """What each work finds and what it leaves on a good disk, made when it is asked for."""
+    """What each work starts from and what it leaves on a good disk, made when it is first needed."""
 
     def __init__(self, works: dict[str, Work], root: Path) -> None:
         self.works, self.root = works, root
 
     def before(self, name: str, out: Path) -> Content:
         """Fill `out` with what is there before, if anything is; its content."""
-        work, kept = self.works[name], self.root / f"{name}-before"
+        work, start = self.works[name], self.root / f"{name}-before"
         if not work.before:
             return {}
-        if not kept.exists():
+        if not start.exists():
             for command in work.before:
-                assert work.here(kept, command) == 0
-        shutil.copytree(kept, out)
+                assert work.here(start, command) == 0
+        shutil.copytree(start, out)
         return work.content(out)
 
     def after(self, name: str) -> Content:
@@ -131,19 +115,19 @@ def folders(works: dict[str, Work], tmp_path_factory: pytest.TempPathFactory) ->
     return Folders(works, tmp_path_factory.mktemp("folders"))
 
 
-def check_failure(said: Said, out: Path) -> None:
-    """The last line is the one sentence that names the folder, and the exit code tells of a failure.
+def check_failure(code: int, error: str, out: Path) -> None:
+    """The exit code tells of a failure, and the last lines are sentences that name the folder.
 
-    Of a collection there can be one sentence for each dataset that was not made.
+    Of a collection there can be one for each dataset that was not made, else there is one.
     """
-    assert said.code in (1, 2), said
-    assert "Traceback" not in said.error
-    lines = said.error.rstrip().splitlines()
+    assert code in (1, 2), error
+    assert "Traceback" not in error
+    lines = error.rstrip().splitlines()
     errors = [line for line in lines if line.startswith(("error: ", "not made: "))]
-    assert errors, said
-    assert errors == lines[-len(errors) :], said
-    assert len(errors) == 1 or all(line.startswith("not made: ") for line in errors), said
-    assert all(out.name in line for line in errors), said  # or a temporary file beside it
+    assert errors, error
+    assert errors == lines[-len(errors) :], error
+    assert len(errors) == 1 or all(line.startswith("not made: ") for line in errors), error
+    assert all(out.name in line for line in errors), error  # or a temporary file beside it
 
 
 def check_after_all(folders: Folders, name: str, out: Path, before: Content) -> None:
@@ -155,109 +139,70 @@ def check_after_all(folders: Folders, name: str, out: Path, before: Content) -> 
     assert verify(out) > 0
 
 
-def broken_at(
-    folders: Folders,
-    name: str,
-    out: Path,
-    capsys: pytest.CaptureFixture[str],
-    chosen: Callable[[int], Iterable[int]],
-) -> int:
-    """Let the disk break after each of the chosen numbers of changes; how often the command failed."""
-    work, failed = folders.works[name], 0
+@pytest.mark.parametrize("name", ["dataset", "results", "evaluation"])
+@pytest.mark.parametrize("at", ["some changes", pytest.param("any change", marks=pytest.mark.slow)])
+def test_a_disk_that_breaks_is_named_and_loses_nothing(
+    folders: Folders, name: str, at: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It breaks after a number of changes: for good, as a disk that is read-only, or for one change."""
+    work, out, failures = folders.works[name], tmp_path / "out", 0
     folders.before(name, out)
-    counting = BrokenDisk(str(out.parent), sys.maxsize)  # results are written beside their folder
-    break_disk(counting)
+    break_disk(counting := BrokenDisk(str(out.parent), sys.maxsize))  # results are written beside
     assert work.here(out) == 0
     break_disk(None)
     shutil.rmtree(out)
-    for number, good in enumerate(chosen(counting.done)):
+    chosen: Iterable[int] = range(counting.done)
+    if at == "some changes":
+        chosen = random.Random(name).sample(chosen, 2)
+    for number, good in enumerate(chosen):
         before = folders.before(name, out)
         capsys.readouterr()
         break_disk(BrokenDisk(str(out.parent), good, heals=number % 2 == 1))
         code = work.here(out)
         break_disk(None)
         if code:  # else what failed was not needed
-            check_failure(Said(code, capsys.readouterr().err), out)
-            failed += 1
+            check_failure(code, capsys.readouterr().err, out)
+            failures += 1
         check_after_all(folders, name, out, before)
         shutil.rmtree(out)
-    return failed
-
-
-@pytest.mark.parametrize("name", ["dataset", "results", "evaluation"])
-@pytest.mark.parametrize("at", ["some changes", pytest.param("any change", marks=pytest.mark.slow)])
-def test_a_disk_that_breaks_is_told_and_loses_nothing(
-    folders: Folders, name: str, at: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    chance = random.Random(name)
-
-    def chosen(changes: int) -> Iterable[int]:
-        return chance.sample(range(changes), 2) if at == "some changes" else range(changes)
-
-    assert broken_at(folders, name, tmp_path / "out", capsys, chosen) > (0 if at == "some changes" else 15)
-
-
-class Mount:
-    """A file system in memory, of a size and for reading alone or not, both of which can be changed."""
-
-    def __init__(self, place: Path) -> None:
-        self.place, self.mounted = place, False
-        place.mkdir()
-
-    def be(self, options: str) -> None:
-        """Mount it with these options, or mount it again."""
-        given = f"{'remount,' * self.mounted}{options}"
-        command = ["mount", "-t", "tmpfs", "-o", given, "tmpfs", str(self.place)]
-        done = subprocess.run(command, capture_output=True, check=self.mounted)
-        if done.returncode:
-            pytest.skip("needs the right to mount a file system")
-        self.mounted = True
+    assert failures > (0 if at == "some changes" else 15)
 
 
 @pytest.fixture
-def mount(tmp_path: Path) -> Iterator[Mount]:
-    mount = Mount(tmp_path / "disk")
-    yield mount
-    if mount.mounted:
-        subprocess.run(["umount", str(mount.place)], check=True)
+def mount(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
+    """Mounts a file system in memory with these options, or mounts it again; where it is."""
+    place, mounted = tmp_path / "disk", list[str]()
+    place.mkdir()
 
+    def mount_with(options: str) -> Path:
+        again = "remount," if mounted else ""
+        command = ["mount", "-t", "tmpfs", "-o", f"{again}{options}", "tmpfs", str(place)]
+        if subprocess.run(command, capture_output=True, check=bool(mounted)).returncode:
+            pytest.skip("needs the right to mount a file system")
+        mounted.append(options)
+        return place
 
-@pytest.mark.parametrize(
-    "name",
-    ["dataset", pytest.param("collection", marks=pytest.mark.slow), "results", "evaluation"],
-)
-def test_a_read_only_disk_is_named(
-    folders: Folders, name: str, mount: Mount, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = mount.place / "out"
-    mount.be("rw")
-    before = folders.before(name, out)
-    mount.be("ro")
-    capsys.readouterr()
-    check_failure(Said(folders.works[name].here(out), capsys.readouterr().err), out)
-    mount.be("rw")
-    check_after_all(folders, name, out, before)
-    if folders.works[name].package == "simgen":  # where nothing is left to do nothing is written
-        mount.be("ro")
-        assert folders.works[name].here(out) == 0
+    yield mount_with
+    if mounted:
+        subprocess.run(["umount", str(place)], check=True)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dataset", "collection", "results", "evaluation"])
-def test_a_full_disk_is_named(folders: Folders, name: str, mount: Mount) -> None:
-    out, failed = mount.place / "out", 0
+def test_a_full_disk_is_named(folders: Folders, name: str, mount: Callable[[str], Path]) -> None:
+    failures = 0
     folders.after(name)
     free_kb = sum(file.stat().st_blocks for file in (folders.root / name).rglob("*")) // 2 + 4096
     for step in range(SIZES):
-        mount.be(f"size={free_kb}k")
+        out = mount(f"size={free_kb}k") / "out"
         before = folders.before(name, out)
         used_kb = sum(file.stat().st_blocks for file in out.rglob("*")) // 2
-        mount.be(f"size={used_kb + 16 + step * (free_kb - 4096 - used_kb) // SIZES}k")
-        said = folders.works[name].apart(out)
-        if said.code:
-            check_failure(said, out)
-            failed += 1
-        mount.be(f"size={2 * free_kb}k")
+        mount(f"size={used_kb + 16 + step * (free_kb - 4096 - used_kb) // SIZES}k")
+        code, error = folders.works[name].apart(out)
+        if code:
+            check_failure(code, error, out)
+            failures += 1
+        mount(f"size={2 * free_kb}k")
         check_after_all(folders, name, out, before)
         shutil.rmtree(out)
-    assert failed >= SIZES // 4
+    assert failures >= SIZES // 4

@@ -18,7 +18,7 @@ import pcii
 import simgen
 from pcii.exchange.dataset_card import Terms, write_card
 from pcii.figures.pictures import write_png
-from pcii.store.sample_dataset import copy_sample
+from pcii.store.dataset import copy_sample
 from simgen.spec.recipe import Recipe, override
 
 DOCS = ROOT / "docs"

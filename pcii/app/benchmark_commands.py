@@ -12,7 +12,7 @@ from pcii.base.progress import Stages
 from pcii.evaluation.benchmark_collection import open_benchmark
 from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.submission_scores import run_method, score_submission
-from pcii.store.collection_layout import IN_FRAMES, Half
+from pcii.store.collection import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]

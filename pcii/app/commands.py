@@ -8,15 +8,13 @@ from cyclopts import Parameter
 from pcii.app.benchmark_commands import benchmark
 from pcii.app.command_options import Depths, Json, Out, evaluated_method
 from pcii.app.import_commands import import_dataset
-from pcii.app.results import other_software
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
 from pcii.base.command_output import results_folder, say, say_next, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
-from pcii.store.results_list import RESULTS
-from pcii.store.sample_dataset import copy_sample
+from pcii.store.dataset import copy_sample
 from pcii.store.verification import verify_and_tell
 
 app = command_line.command_app(
@@ -115,8 +113,6 @@ def verify(folder: Path, *, json: Json = False) -> None:
         Print the number of files, or what is wrong, as JSON.
     """
     verify_and_tell(folder, as_json=json)
-    if (folder / RESULTS).is_file() and not json and (difference := other_software(folder)):
-        say(f"other software made these results: {difference}")
 
 
 def main() -> int:

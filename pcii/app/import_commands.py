@@ -21,7 +21,8 @@ from pcii.exchange.import_requests import (
     read,
     values_of,
 )
-from pcii.store.dataset_writer import held_dataset, save_dataset
+from pcii.store.dataset_writer import save_dataset
+from pcii.store.folders import check_free
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
@@ -121,7 +122,7 @@ def import_dataset(
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light):
         options |= values_of(group)
-    held_dataset(out, None, content=False)
+    check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
         imported = read(Source(source, report, notes.append), options)

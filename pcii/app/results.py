@@ -36,9 +36,16 @@ from pcii.base.safe_files import (
 from pcii.depth.methods import DEFAULT_METHOD
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.file_list import list_files, lists_part, strays
-from pcii.store.hashes import hash_json
-from pcii.store.results_list import REMEDY, RESULTS, read_results, write_results
+from pcii.store.folders import (
+    RESULTS,
+    RESULTS_FOLDER,
+    Files,
+    hash_json,
+    list_files,
+    lists_part,
+    read_results,
+    unlisted_files,
+)
 from pcii.store.software import differences, own_software
 from pcii.store.zarr_groups import read_array, write_arrays
 from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS
@@ -88,16 +95,16 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
     with _only_writer(lock, out), named_in_errors(out):
         for left in temporaries_of(target.parent, target.name):  # by a command that was killed
             shutil.rmtree(left, ignore_errors=True)
-        before = _results_of(out, dataset)
-        whole = whole or not before["files"]
-        if whole and (extra := strays(target, [RESULTS, *before["files"]])):
+        files_before, versions_before = _results_of(out, dataset)
+        whole = whole or not files_before
+        if whole and (extra := unlisted_files(target, [RESULTS, *files_before])):
             raise InputError(f"{out}: holds {extra[0]}, which is no result; move it away")
         with temporary_folder(target) as folder:
             yield folder
             files = list_files(folder, sorted(entry.name for entry in folder.iterdir()))
             content = _origin(dataset) | {"versions": own_software(), "files": files}
             if whole:
-                write_results(folder, content)
+                RESULTS_FOLDER.write(folder, content)
                 replace_folder(folder, target)
                 return
             sweep_temporaries(target)
@@ -107,10 +114,10 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
                     replace_folder(folder / part, target / part)
                 else:
                     (folder / part).replace(target / part)
-            remaining = {n: entry for n, entry in before["files"].items() if n.split("/")[0] not in parts}
+            remaining = {n: entry for n, entry in files_before.items() if n.split("/")[0] not in parts}
             content["files"] = dict(sorted((remaining | files).items()))
-            content["versions"] = _all_versions(before["versions"], own_software())
-            write_results(target, content)
+            content["versions"] = _all_versions(versions_before, own_software())
+            RESULTS_FOLDER.write(target, content)
 
 
 @contextmanager
@@ -128,22 +135,22 @@ def _only_writer(lock: Path, out: Path) -> Iterator[None]:
 def _origin(dataset: Dataset) -> dict[str, Any]:
     """Dataset and light that results belong to, as in results.json."""
     manifest = dataset.manifest
-    identity = manifest.get("identity") or hash_json(manifest["files"])
+    identity = manifest.identity or hash_json(manifest.files)
     return {"dataset": dataset.name, "identity": identity, "light": dataset.budget}
 
 
-def _results_of(out: Path, dataset: Dataset) -> dict[str, Any]:
-    """The list of the results in `out`, without files if none are there; `InputError` if of other data."""
+def _results_of(out: Path, dataset: Dataset) -> tuple[Files, Mapping[str, str]]:
+    """The files of the results in `out`, and the versions that made them; `InputError` if of other data."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: this is a file; name a folder for the results")
     if not out.exists() or not any(out.iterdir()):
-        return {"versions": {}, "files": {}}
+        return {}, {}
     if not (out / RESULTS).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
     results, origin = read_results(out), _origin(dataset)
-    if (results["identity"], results["light"]) != (origin["identity"], origin["light"]):
+    if (results.identity, results.light) != (origin["identity"], origin["light"]):
         raise InputError(f"{out}: holds the results of another dataset or light; name a new or empty folder")
-    return results
+    return results.files, results.versions
 
 
 def _all_versions(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
@@ -189,12 +196,14 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
     The sections of the masks are reconstructed again. Raises `InputError` for a folder without either, for
     results of another dataset or light, and for files that are missing or were changed.
     """
-    files = _results_of(out, dataset)["files"]
+    files = _results_of(out, dataset)[0]
     sizes = {"row": dataset.grid.height, "col": dataset.grid.width}
 
     def read(part: str, labels: Mapping[str, Any]) -> dict[str, np.ndarray]:
         names = [name for name in labels if lists_part(files, f"{part}/{name}")]
-        return {n: read_array(out, f"{part}/{n}", files, labels[n], sizes, REMEDY) for n in names}
+        return {
+            n: read_array(out, f"{part}/{n}", files, labels[n], sizes, RESULTS_FOLDER.remedy) for n in names
+        }
 
     segmented: list[Segmented] = []
     sections: dict[bytes, Sections] = {}
@@ -214,4 +223,4 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
 
 def other_software(out: Path) -> str:
     """How the software that made the results in a folder differs from that of now; empty if it does not."""
-    return differences(read_results(out)["versions"], own_software())
+    return differences(read_results(out).versions, own_software())

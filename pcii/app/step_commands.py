@@ -27,7 +27,7 @@ from pcii.removal import methods as removal
 from pcii.sections import reconstruction
 from pcii.sections.demosaicing import demosaic
 from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.results_list import read_results
+from pcii.store.folders import read_results
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes

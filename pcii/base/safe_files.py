@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -33,16 +33,14 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
 
 
 def add_files_safely(folder: Path, contents: Mapping[str, bytes], *, overwrite: bool) -> None:
-    """Write files of these names and contents into a folder, new or not, in this order, each safely.
+    """Write files of these names and contents into a folder, new or not, each safely.
 
-    What is there with the same content is left as it is. With other content it is refused by `InputError`
-    before anything is written, unless `overwrite`.
+    A file that is there with other content is refused by `InputError` before anything is written, unless
+    `overwrite`.
     """
     new = {folder / name: content for name, content in contents.items()}
-    for path, content in list(new.items()):
-        if path.is_file() and path.read_bytes() == content:
-            del new[path]
-        elif path.is_dir() or (path.exists() and not overwrite):
+    for path, content in new.items():
+        if path.is_dir() or (path.exists() and not overwrite and path.read_bytes() != content):
             raise InputError(
                 f"{path}: is there with other content; name another folder, or give overwrite=True"
             )
@@ -156,15 +154,13 @@ def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
             continue
         with opened as file:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            # The last holder may have deleted the file between opening and locking; then try again.
-            if _is_same_file(file, path):
+            if _is_file_at(path, file):  # else the last holder has deleted it meanwhile
                 file.seek(0)
                 yield file
                 return
 
 
-def _is_same_file(file: IO[bytes], path: Path) -> bool:
-    try:
+def _is_file_at(path: Path, file: IO[bytes]) -> bool:
+    with suppress(FileNotFoundError):
         return os.path.samestat(os.fstat(file.fileno()), path.stat())
-    except FileNotFoundError:
-        return False
+    return False

@@ -9,8 +9,7 @@ from pydantic import ValidationError
 
 from pcii.base.errors import InputError
 from pcii.store.benchmark_layout import Definition
-from pcii.store.collection import Collection, open_collection
-from pcii.store.collection_layout import Half, is_collection, read_collection
+from pcii.store.collection import Collection, Half, is_collection, open_collection, read_collection
 from pcii.store.dataset import Dataset
 
 
@@ -59,7 +58,7 @@ def open_benchmark(path: Path) -> BenchmarkCollection:
     if not is_collection(path):
         raise fault
     try:
-        definition = Definition.model_validate(read_collection(path).get("recipe"))
+        definition = Definition.model_validate(read_collection(path).recipe)
     except ValidationError:
         raise fault from None
     return BenchmarkCollection(definition.name, open_collection(path))

@@ -18,7 +18,7 @@ from pcii.evaluation.submitted_maps import light_folder, submitted_depth, submit
 from pcii.evaluation.tasks import Task
 from pcii.figures.pictures import photo_bytes
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.collection_layout import Half
+from pcii.store.collection import Half
 from pcii.store.dataset import Dataset
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented

@@ -22,8 +22,8 @@ from pcii.evaluation.submission_scores import by_scene
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import Table, budget_name, with_interval
 from pcii.figures.pictures import uri_of
-from pcii.store.collection_layout import IN_FRAMES
-from pcii.store.evaluation_layout import read_evaluation
+from pcii.store.collection import IN_FRAMES
+from pcii.store.folders import read_evaluation
 
 SCENES_NAMED = 3
 """So many of the best and of the worst scenes of each method are shown."""

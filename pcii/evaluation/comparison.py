@@ -35,7 +35,7 @@ from pcii.metrics.bounds import object_bounds
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.collection_layout import is_collection, read_index
+from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import MANIFEST, MARKER
 from pcii.store.software import differences

@@ -18,8 +18,7 @@ from pcii.evaluation.tables import (
 )
 from pcii.figures.charts import accuracy_chart, calibration_chart
 from pcii.figures.panels import figure_uri
-from pcii.store.evaluation_layout import ROWS, seal_evaluation
-from pcii.store.hashes import hash_file
+from pcii.store.folders import ROWS, hash_file, seal_evaluation
 
 MEASURES = {
     "iou": ("object", "IoU, mean over planes"),

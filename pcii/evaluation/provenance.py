@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pcii.depth import methods as depth
 from pcii.evaluation.method_names import estimator_of
 from pcii.removal import methods as removal
-from pcii.store.hashes import hash_bytes
+from pcii.store.folders import hash_bytes
 from pcii.store.software import own_software, software_of_entry_point
 
 if TYPE_CHECKING:

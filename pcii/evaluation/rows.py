@@ -1,8 +1,7 @@
 """rows.jsonl: one JSON object per measured score, written safely by several processes at once.
 
 A row belongs to a dataset (by its identity), a photon budget or full light, and a method. What is measured
-again, since other software made it, is added below, and the last row counts. Each ends in a checksum of its
-line (see `pcii.store.sealed_json`).
+again, since other software made it, is added below, and the last row counts.
 """
 
 import json
@@ -11,14 +10,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
 from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
-from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
-from pcii.store.hashes import hash_json
-from pcii.store.sealed_json import check_seal, sealed
+from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
+
+if TYPE_CHECKING:
+    from pcii.store.manifests import DatasetManifest
 
 Row = dict[str, Any]
 Key = tuple[str, Budget, str, tuple[float, ...]]
@@ -46,14 +46,14 @@ def by_light(budget: Budget) -> tuple[int, float]:
     return (1, 0.0) if budget is None else (0, float(budget))
 
 
-def identity_of(manifest: Mapping[str, Any]) -> str:
+def identity_of(manifest: "DatasetManifest") -> str:
     """Identity of a dataset: that in its manifest, else a hash of its files' hashes."""
-    return manifest.get("identity") or hash_json(manifest["files"])
+    return manifest.identity or hash_json(manifest.files)
 
 
-def recipe_of(manifest: Mapping[str, Any]) -> str:
+def recipe_of(manifest: "DatasetManifest") -> str:
     """Hash of a dataset's recipe without the seed, and of its scene; seeds of one recipe share it."""
-    recipe = {name: value for name, value in manifest.get("recipe", {}).items() if name != "seed"}
+    recipe = {name: value for name, value in manifest.recipe.items() if name != "seed"}
     if not recipe:
         return identity_of(manifest)[:16]
     return hash_json({"recipe": recipe, "scene": manifest.get("scene")})[:16]
@@ -62,13 +62,13 @@ def recipe_of(manifest: Mapping[str, Any]) -> str:
 def described(dataset: Dataset, z_mm: Sequence[float]) -> Row:
     """The fields of a row that describe its dataset, seen at the depths `z_mm` or, of none, at its own."""
     manifest = dataset.manifest
-    recipe = manifest.get("recipe", {})
+    recipe = manifest.recipe
     settings = dict(_settings({name: recipe[name] for name in recipe if name not in ("title", "seed")}))
     row = {
         "dataset": dataset.name,
         "identity": identity_of(manifest),
         "recipe": recipe_of(manifest),
-        "title": manifest.get("title") or dataset.name,
+        "title": manifest.title or dataset.name,
         "scene": recipe.get("scene"),
         "seed": recipe.get("seed"),
         "settings": settings,
@@ -115,9 +115,7 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
         rows: dict[Key, Row] = {}
         for number, line in enumerate(lines, start=1):
             try:
-                check_seal(line)
                 row = json.loads(line)
-                del row["sha256"]
                 rows[key_of(row)] = row
             except (ValueError, KeyError, TypeError) as fault:
                 raise InputError(f"{out / ROWS}: line {number}: {fault}; delete that line") from None
@@ -126,7 +124,9 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
 
 def append_row(out: Path, row: Row) -> None:
     """Add a row and flush it to disk, after removing an incomplete last line of a killed process."""
-    line = sealed(row, _on_one_line) + b"\n"
+    # Names of files may hold bytes that are not valid characters.
+    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
+    line = text.encode(errors="backslashreplace") + b"\n"
     with named_in_errors(out / ROWS), locked(out / ROWS, wait=True) as file:
         if file.seek(0, os.SEEK_END):
             file.seek(-1, os.SEEK_END)
@@ -136,9 +136,3 @@ def append_row(out: Path, row: Row) -> None:
         file.write(line)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _on_one_line(row: Mapping[str, Any]) -> bytes:
-    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
-    # Names of files may hold bytes that are not valid characters.
-    return text.encode(errors="backslashreplace")

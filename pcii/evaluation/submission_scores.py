@@ -35,9 +35,9 @@ from pcii.evaluation.submission_pictures import PICTURES
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import budget_name
 from pcii.evaluation.tasks import Task, lights_of, tasks_of
-from pcii.store.collection_layout import Half
+from pcii.store.collection import Half
 from pcii.store.dataset import FULL_LIGHT, Budget, budget_of
-from pcii.store.evaluation_layout import ROWS
+from pcii.store.folders import ROWS
 
 
 def run_method(

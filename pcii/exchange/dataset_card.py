@@ -10,7 +10,7 @@ from typing import Any
 
 from pcii.base.plain_text import in_json, in_markdown, web_address
 from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
-from pcii.store.collection_layout import COLLECTION, is_collection, read_collection, read_index
+from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 
 PROJECT = "photon-integral-imaging"
@@ -69,16 +69,16 @@ def write_card(root: Path, terms: Terms) -> None:
 
 def _of_dataset(root: Path) -> list[str]:
     manifest = read_manifest(root)
-    grid, recipe = manifest["grid"], manifest.get("recipe", {})
-    scene = f" of the scene {recipe['scene']}" if recipe.get("scene") else ""
-    pattern = f"Bayer pattern {manifest['cfa']}" if manifest["cfa"] else "no colour filters"
-    photons = (manifest.get("photons") or {}).get("total")
+    grid, recipe = manifest.grid, manifest.recipe
+    scene = f" of the scene {name}" if (name := recipe.get("scene")) else ""
+    pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
+    photons = (manifest.photons or {}).get("total")
     total = "" if photons is None else f" {photons} photons were counted in all."
-    objects = ", ".join(in_markdown(str(name)) for name in manifest.get("objects", {}).values())
+    objects = ", ".join(in_markdown(str(name)) for name in manifest.objects.values())
     return [
-        f"# {in_markdown(manifest.get('title') or 'Integral images')}",
-        f"Integral imaging in little light: {grid['rows']} x {grid['cols']} views of {grid['height']} x "
-        f"{grid['width']} pixels{in_markdown(scene)}, {pattern}.{total}",
+        f"# {in_markdown(manifest.title or 'Integral images')}",
+        f"Integral imaging in little light: {grid.rows} x {grid.cols} views of {grid.height} x "
+        f"{grid.width} pixels{in_markdown(scene)}, {pattern}.{total}",
         f"Objects: {objects}." if objects else "",
         HOW_TO_READ.format(install=INSTALL, example='dataset = pcii.open_dataset("FOLDER")'),
     ]
@@ -86,9 +86,9 @@ def _of_dataset(root: Path) -> list[str]:
 
 def _of_collection(root: Path) -> list[str]:
     document, rows = read_collection(root), read_index(root)
-    recipe = document.get("recipe", {})
+    recipe = document.recipe
     title = recipe.get("title") or f"Integral images of {recipe.get('scene') or 'many scenes'}"
-    differing = "; ".join(_values_of(field, rows) for field in document["fields"])
+    differing = "; ".join(_values_of(field, rows) for field in document.fields)
     return [
         f"# {in_markdown(title)}",
         f"A collection of {len(rows)} datasets of integral imaging in little light, made by simulation: a "

@@ -30,10 +30,9 @@ from pcii.exchange.export_pictures import (
     view_name,
     write_nerfstudio,
 )
-from pcii.store.collection import Collection, open_collection
-from pcii.store.collection_layout import is_collection
+from pcii.store.collection import Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.folder_kind import check_free
+from pcii.store.folders import check_free
 from pcii.types.photon_events import FrameEvents
 from pcii.types.truth import OPTIONAL_MAPS, Truth
 

@@ -90,7 +90,7 @@ def _parameters(
     dataset: Dataset, baseline_mm: float, shear_px: float, disparity_px: Callable[[np.ndarray], np.ndarray]
 ) -> str:
     """The text of parameters.cfg: sections and keys as the benchmark's tools read and write them."""
-    grid, recipe = dataset.grid, dataset.manifest.get("recipe", {})
+    grid, recipe = dataset.grid, dataset.manifest.recipe
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
     lens = recipe.get("grid", {}).get("lens")
     lowest, highest = _range_px(dataset, disparity_px)

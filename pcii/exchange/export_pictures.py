@@ -67,7 +67,7 @@ def pictures_of(dataset: Dataset) -> ViewPictures:
 
 def _radiance_pictures(dataset: Dataset, views: Views) -> ViewPictures:
     grid, cfa = dataset.grid, views.cfa
-    unit = visible(str(dataset.manifest.get("radiance_unit", "radiance")))
+    unit = visible(str(dataset.manifest.radiance_unit or "radiance"))
 
     def colours(k: int, l: int) -> np.ndarray:
         image = views.view(k, l)

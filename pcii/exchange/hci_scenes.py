@@ -17,7 +17,7 @@ from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.exchange.image_folders import Optics, Tell, import_images, listed_names, warn
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
-from pcii.store.sealed_json import read_small
+from pcii.store.folders import read_small
 from pcii.types.images import Views
 from pcii.types.truth import Truth
 

@@ -20,7 +20,7 @@ from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
 from pcii.exchange.image_folders import VIEWS, Tell, warn
 from pcii.exchange.pixel_files import picture_of
-from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, read_small
+from pcii.store.folders import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
 """What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""

@@ -18,9 +18,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
-from pcii.store.collection_layout import BENCHMARK_FIELDS, Half
+from pcii.store.collection import BENCHMARK_FIELDS, Half
 from pcii.store.dataset import Dataset
-from pcii.store.hashes import hash_json
+from pcii.store.folders import hash_json
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Light = Literal["photons", "frames", "full-light"]
@@ -159,7 +159,7 @@ def published_certificate(file: Path) -> dict[str, Any]:
 
 def content_of(dataset: Dataset) -> Content:
     """What a dataset is compared by."""
-    files = {name: entry["sha256"] for name, entry in dataset.manifest["files"].items()}
+    files = {name: entry["sha256"] for name, entry in dataset.manifest.files.items()}
     content: dict[str, Any] = {"sha256": hash_json(files)}
     if dataset.has_counts:
         grid, events = dataset.grid, dataset.counts.events

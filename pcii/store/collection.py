@@ -1,17 +1,53 @@
-"""Collections of datasets, opened one by one as they are used."""
+"""Collections of datasets, opened one by one as they are used.
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+    collection.json   the recipe that all have in common, and the fields that differ
+    index.jsonl       a line of JSON for each finished dataset, in order; the last line is the hash of all
+                      others
+    draw_17_seed_3/   a dataset, named by the values of the fields that differ
+
+The index is written when the work on the collection ends or is interrupted. It says what could be read from
+all the manifests, and the hash of each.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import write_bytes_safely
 from pcii.base.short_form import ShortForm, listed
-from pcii.store.collection_layout import check_manifest, read_collection, read_index
 from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset_layout import MANIFEST
+from pcii.store.folders import FolderKind, hash_bytes, hash_file
+
+if TYPE_CHECKING:
+    import pandas
+
+    from pcii.store.manifests import CollectionManifest, DatasetManifest
 
 COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 """Columns of the table beside the swept fields."""
+COLLECTION = "collection.json"
+INDEX = "index.jsonl"
+REMEDY = "the same `simgen generate` command makes it again from the datasets"
+COLLECTION_FOLDER = FolderKind(
+    "collection",
+    COLLECTION,
+    version=1,
+    absent=f"not a collection (no {COLLECTION}); make one with `simgen generate`",
+    remedy=REMEDY,
+    marks=frozenset({COLLECTION}),
+    has_checksum=True,
+)
+Split = Literal["train", "validation", "test"]
+Half = Literal["development", "test"]
+"""Of a benchmark: methods are made on the one, and what is reported is of the other."""
+BENCHMARK_FIELDS = ("name", "kind", "half", "light", "seed")
+"""What distinguishes the datasets of a benchmark, which is a collection of many recipes."""
+IN_FRAMES = ", binary frames"
+"""What follows the name of the scene in the title of a benchmark's dataset that is binary frames."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,9 +83,6 @@ class Collection(ShortForm, Sequence[Dataset]):
             return replace(self, rows=self.rows[number])
         return open_dataset(check_manifest(self.path, self.rows[number]))
 
-    def __iter__(self) -> Iterator[Dataset]:
-        return (self[number] for number in range(len(self)))
-
     def where(
         self, condition: Callable[[Mapping[str, Any]], bool] | None = None, /, **values: Any
     ) -> "Collection":
@@ -61,9 +94,9 @@ class Collection(ShortForm, Sequence[Dataset]):
         """
         named = {self._column(name): value for name, value in values.items()}
         for column, value in named.items():
-            held = [_cell(row, column) for row in self.rows]
-            if held and value not in held:
-                known = listed([str(one) for one in dict.fromkeys(map(str, held))])
+            present = [_cell(row, column) for row in self.rows]
+            if present and value not in present:
+                known = listed(list(dict.fromkeys(map(str, present))))
                 raise InputError(f"where: no dataset has {column} = {value!r}; there are {known}")
         rows = [
             row
@@ -73,12 +106,12 @@ class Collection(ShortForm, Sequence[Dataset]):
         ]
         return replace(self, rows=tuple(rows))
 
-    def table(self) -> dict[str, list[Any]]:
-        """Columns by name, a value for each dataset: what a data frame is made of."""
-        return {
-            column: [_cell(row, column) for row in self.rows]
-            for column in dict.fromkeys([*COLUMNS, *self.fields])
-        }
+    def table(self) -> "pandas.DataFrame":
+        """A row for each dataset: its folder, scene, split, photons, and the fields that differ."""
+        import pandas
+
+        columns = dict.fromkeys([*COLUMNS, *self.fields])
+        return pandas.DataFrame({name: [_cell(row, name) for row in self.rows] for name in columns})
 
     def _column(self, name: str) -> str:
         known = [*COLUMNS, *self.fields]
@@ -97,8 +130,89 @@ def open_collection(path: str | Path) -> Collection:
     """
     root = Path(path)
     document, rows = read_collection(root), read_index(root)
-    return Collection(root, tuple(document["fields"]), tuple(rows))
+    return Collection(root, tuple(document.fields), tuple(rows))
 
 
 def _cell(row: Mapping[str, Any], column: str) -> Any:
     return row["values"][column] if column in row["values"] else row.get(column)
+
+
+def split_of(scene_number: int) -> Split:
+    """Split of a drawn scene, by its number modulo 10: 80 % training, 10 % validation, 10 % test.
+
+    All datasets of a scene are in the same split, however many there are.
+
+    >>> [split_of(number) for number in (0, 17, 8, 29)]
+    ['train', 'train', 'validation', 'test']
+    """
+    last: dict[int, Split] = {8: "validation", 9: "test"}
+    return last.get(scene_number % 10, "train")
+
+
+def index_row(
+    name: str, values: Mapping[str, Any], manifest: "DatasetManifest", manifest_file: Path
+) -> dict[str, Any]:
+    """The index's line about a finished dataset, in the folder `name`, of these values of swept fields."""
+    recipe, photons = manifest.recipe, manifest.photons
+    number = recipe.get("scene_number")
+    return {
+        "path": name,
+        "values": dict(values),
+        "scene": recipe.get("scene"),
+        "scene_number": number,
+        "seed": recipe.get("seed"),
+        "split": None if number is None else split_of(number),
+        "photons": None if photons is None else photons["total"],
+        "identity": manifest.identity,
+        "manifest_sha256": hash_file(manifest_file),
+    }
+
+
+def read_collection(root: Path) -> "CollectionManifest":
+    """What the datasets of a collection have in common; `InputError` if that is missing or damaged."""
+    from pcii.store.manifests import CollectionManifest
+
+    return COLLECTION_FOLDER.read(root, CollectionManifest)
+
+
+def write_index(root: Path, rows: Iterable[Mapping[str, Any]]) -> None:
+    """Write the index, atomically."""
+    write_bytes_safely(root / INDEX, index_bytes(rows))
+
+
+def index_bytes(rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """The index of these rows as it is written."""
+    lines = b"".join(json.dumps(row, allow_nan=False).encode() + b"\n" for row in rows)
+    return lines + json.dumps({"sha256": hash_bytes(lines)}).encode() + b"\n"
+
+
+def read_index(root: Path) -> list[dict[str, Any]]:
+    """Rows of the index; `InputError` if it is missing, was changed or lacks a member."""
+    path = root / INDEX
+    if not path.is_file():
+        raise InputError(f"{root}: the collection has no {INDEX} yet; {REMEDY}")
+    content = path.read_bytes()
+    try:
+        rows = [json.loads(line) for line in content.splitlines()[:-1]]
+        if content != index_bytes(rows):
+            raise ValueError("its checksum does not match")
+        if any("/" in row["path"] or row["path"].startswith(".") for row in rows):
+            raise ValueError("a row is not of a dataset in this folder")
+    except (ValueError, TypeError, KeyError) as fault:
+        raise InputError(f"{path}: damaged or changed ({fault}); {REMEDY}") from None
+    return rows
+
+
+def is_collection(path: Path) -> bool:
+    """Whether a folder holds a collection."""
+    return (path / COLLECTION).is_file()
+
+
+def check_manifest(root: Path, row: Mapping[str, Any]) -> Path:
+    """Folder of the dataset of a row; `InputError` if its manifest is not the one that the index lists."""
+    folder = root / row["path"]
+    if not (folder / MANIFEST).is_file():
+        raise InputError(f"{folder}: listed in {INDEX} but missing or unfinished; {REMEDY}")
+    if hash_file(folder / MANIFEST) != row["manifest_sha256"]:
+        raise InputError(f"{folder / MANIFEST}: is not the one that {INDEX} lists; {REMEDY}")
+    return folder

@@ -1,14 +1,16 @@
-"""Datasets: counts, truth and radiance of a dataset folder, checked when they are read."""
+"""Datasets: counts, truth and radiance of a dataset folder, each checked when it is read."""
 
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import new_folder_safely
 from pcii.base.short_form import ShortForm, listed, times
 from pcii.store.dataset_layout import (
     COUNTS,
@@ -23,7 +25,7 @@ from pcii.store.dataset_layout import (
     read_exr,
     read_manifest,
 )
-from pcii.store.file_list import check_file, check_files, lists_part
+from pcii.store.folders import check_file, check_files, check_free, lists_part
 from pcii.store.zarr_groups import read_array
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.types.camera_grid import CameraGrid
@@ -31,6 +33,10 @@ from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 
+if TYPE_CHECKING:
+    from pcii.store.manifests import DatasetManifest
+
+SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
 FULL_LIGHT: Final = "full-light"
 """Stands for the photon budget where the radiance is looked at."""
 Budget = float | Literal["full-light"] | None
@@ -64,15 +70,8 @@ class StoredRadiance:
 
     def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         K, L = self.shape[:2]
-        is_pair = (
-            isinstance(index, tuple)
-            and len(index) == 2
-            and all(isinstance(n, int | np.integer) for n in index)
-        )
-        if not is_pair or not (0 <= index[0] < K and 0 <= index[1] < L):
-            raise InputError(
-                f"radiance: read one view of {K} x {L} by [k, l], or all by numpy.asarray; got {index!r}"
-            )
+        if index not in np.ndindex(K, L):
+            raise InputError(f"radiance: read one of {K} x {L} views by [k, l], or all by numpy.asarray")
         return read_exr(self._file_of(*index), self.shape[2:])
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
@@ -90,11 +89,19 @@ class Dataset(ShortForm):
     """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
 
     path: Path
-    manifest: Mapping[str, Any]
-    grid: CameraGrid
-    cfa: str | None
+    manifest: "DatasetManifest"
     budget: Budget = None
     """Nested photon budget of `counts`; None for the budget of the recipe; `FULL_LIGHT` for no counts."""
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras."""
+        return self.manifest.grid
+
+    @property
+    def cfa(self) -> str | None:
+        """Bayer pattern; None for a monochrome sensor."""
+        return self.manifest.cfa
 
     def _facts(self) -> dict[str, object]:
         parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
@@ -112,14 +119,14 @@ class Dataset(ShortForm):
     def budgets(self) -> tuple[float | None, ...]:
         """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure.
 
-        They are those of the recipe; a dataset without one, as of images by others, may have a budget too.
-        Without counts there are none.
+        They are those of the recipe or, of images by others, that which was stated. Without counts there are
+        none.
         """
         if not self.has(COUNTS):
             return ()
-        photons = self.manifest.get("recipe", {}).get("photons", {})
+        photons = self.manifest.recipe.get("photons", {})
         largest = None if photons.get("scope") == "exposure" else photons.get("budget")
-        return (*sorted(photons.get("nested") or []), self.manifest.get("photon_budget") or largest)
+        return (*sorted(photons.get("nested") or []), self.manifest.photon_budget or largest)
 
     @property
     def photon_budget(self) -> float | None:
@@ -133,18 +140,14 @@ class Dataset(ShortForm):
 
         Raises `InputError` for another budget, and for full light of a dataset without radiance.
         """
-        if budget == FULL_LIGHT:
-            if not self.has(RADIANCE):
-                raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
-            return replace(self, budget=FULL_LIGHT)
-        *nested, largest = self.budgets or (None,)
-        if budget == largest:
-            return replace(self, budget=None)
-        if budget is None or budget not in nested:
-            known = ", ".join(f"{n:g}" for n in (largest, *nested) if n is not None)
-            asked = "none" if budget is None else f"{budget:g}"
-            raise InputError(f"{self.path}: no photons of budget {asked} here; there are {known or 'none'}")
-        return replace(self, budget=budget)
+        if budget == FULL_LIGHT and not self.has(RADIANCE):
+            raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
+        budgets = self.budgets or (None,)
+        if budget not in (*budgets, FULL_LIGHT):
+            known = ", ".join(f"{n:g}" for n in budgets if n is not None) or "none"
+            missing = str(budget).removesuffix(".0")
+            raise InputError(f"{self.path}: no photons of budget {missing} here; there are {known}")
+        return replace(self, budget=None if budget == budgets[-1] else budget)
 
     @property
     def name(self) -> str:
@@ -154,7 +157,7 @@ class Dataset(ShortForm):
     @property
     def analysis(self) -> Mapping[str, Any]:
         """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests; empty if none."""
-        return self.manifest.get("analysis") or {}
+        return self.manifest.analysis or {}
 
     @property
     def _counts_name(self) -> str | None:
@@ -169,24 +172,24 @@ class Dataset(ShortForm):
     def counts(self) -> PhotonCounts:
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
-        if part is None:
-            raise InputError(f"budget: {FULL_LIGHT} is the radiance, and this needs photon counts")
-        if not self.has_counts:
+        if part is None or not self.has(part):
+            what = f"{FULL_LIGHT} is the radiance, and this needs" if part is None else "this dataset has no"
             raise InputError(
-                f"{self.path}: this dataset has no photon counts; import the images with --photons N, "
-                "or generate it with products.counts = true"
+                f"{self.path}: {what} photon counts; import the images with --photons N, or generate it with "
+                "products.counts = true"
             )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         if self.has(f"{part}/{FRAME}"):
             names += (FRAME,)
         arrays = self._arrays(part, COUNTS_LABELS, names)
-        manifest, frame = self.manifest, arrays.get(FRAME)
-        counted: dict[str, Any] = {"frames": manifest.get("frames", 1), "bits": manifest.get("bits")}
+        readout: dict[str, Any] = {"frames": self.manifest.frames, "bits": self.manifest.bits}
         try:
             if "dense" in arrays:
-                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **counted)
+                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **readout)
             k, l, i, j, n = (arrays[name] for name in "klijn")
-            return PhotonCounts.from_events(k, l, i, j, n, self.grid, cfa=self.cfa, frame=frame, **counted)
+            return PhotonCounts.from_events(
+                k, l, i, j, n, self.grid, cfa=self.cfa, frame=arrays.get(FRAME), **readout
+            )
         except InputError as fault:
             raise InputError(f"{self.path / part}: {fault}") from None
 
@@ -197,10 +200,9 @@ class Dataset(ShortForm):
             return None
         optional = tuple(name for name in OPTIONAL_MAPS if self.has_truth_array(name))
         arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
-        names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
         photons = self._photon_truth()
         try:
-            return Truth(**arrays, names=names, photons=photons)
+            return Truth(**arrays, names=self.manifest.objects, photons=photons)
         except InputError as fault:
             raise InputError(f"{self.path / TRUTH}: {fault}") from None
 
@@ -220,9 +222,7 @@ class Dataset(ShortForm):
             return None
         origins = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
         events = self.counts.events
-        if origins["z_mm"].shape != (self.counts.total,) or origins["object_id"].shape != (
-            self.counts.total,
-        ):
+        if {array.shape for array in origins.values()} != {(self.counts.total,)}:
             raise InputError(f"{self.path / part}: does not belong to the counts beside it")
         pixels = {name: getattr(events, name).repeat(events.n) for name in "klij"}
         return PhotonTruth(**pixels, **origins)
@@ -232,21 +232,13 @@ class Dataset(ShortForm):
         """Radiance of the views, read from disk one view at a time, or None if the dataset has none."""
         if not self.has(RADIANCE):
             return None
-        channels = self.manifest.get("radiance_channels")
+        channels = self.manifest.radiance_channels
         if channels is None:
             raise InputError(
                 f"{self.path / MANIFEST}: radiance_channels: missing, though it lists {RADIANCE}"
             )
         cfa = self.cfa if channels == 1 else None
-        shape, known = (*self.grid.shape_KLHW, channels), set[str]()
-
-        def file_of(k: int, l: int) -> Path:
-            name = radiance_name(k, l)
-            path = self.check(name, content=name not in known)
-            known.add(name)
-            return path
-
-        return Views(StoredRadiance(shape, file_of), self.grid, cfa)
+        return Views(StoredRadiance((*self.grid.shape_KLHW, channels), self._view_file), self.grid, cfa)
 
     @property
     def counts_or_views(self) -> PhotonCounts | Views:
@@ -256,14 +248,14 @@ class Dataset(ShortForm):
 
     def has(self, part: str) -> bool:
         """Whether the manifest lists the file `part`, or files of a folder of this name."""
-        return lists_part(self.manifest["files"], part)
+        return lists_part(self.manifest.files, part)
 
-    def check(self, name: str, *, content: bool = True) -> Path:
-        """Path of a listed file after a check of its size (and hash, if `content`); raises `InputError`."""
-        entry = self.manifest["files"].get(name)
-        if entry is None:
+    def _view_file(self, k: int, l: int) -> Path:
+        """File of the radiance of a view, after a check of its hash."""
+        name = radiance_name(k, l)
+        if name not in self.manifest.files:
             raise InputError(f"{self.path}: the manifest lists no {name}")
-        check_file(self.path, name, entry, REMEDY, content=content)
+        check_file(self.path, name, self.manifest.files[name], REMEDY, content=True)
         return self.path / name
 
     def _arrays(
@@ -271,7 +263,7 @@ class Dataset(ShortForm):
     ) -> dict[str, np.ndarray]:
         K, L, H, W = self.grid.shape_KLHW
         sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
-        files = self.manifest["files"]
+        files = self.manifest.files
         return {
             name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
             for name in names
@@ -285,16 +277,33 @@ def open_dataset(path: str | Path) -> Dataset:
     ignored. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since
     it was written, or a file that is missing or truncated.
 
-    >>> from tempfile import TemporaryDirectory
-    >>> from pcii.store.dataset_layout import write_manifest
-    >>> grid = dict(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
-    >>> with TemporaryDirectory() as folder:
-    ...     write_manifest(Path(folder), {"grid": grid, "cfa": "GRBG", "files": {}})
-    ...     dataset = open_dataset(folder)
-    >>> dataset.grid.view_count, dataset.cfa, dataset.truth
-    (2, 'GRBG', None)
+    >>> open_dataset(SAMPLE).counts.total
+    50202
     """
     root = Path(path)
     manifest = read_manifest(root)
-    check_files(root, manifest["files"], REMEDY, content=False)
-    return Dataset(root, manifest, CameraGrid(**manifest["grid"]), manifest["cfa"])
+    check_files(root, manifest.files, REMEDY, content=False)
+    return Dataset(root, manifest)
+
+
+def sample() -> Dataset:
+    """A small dataset of the paper's ball and bird, with photon counts, truth and radiance.
+
+    It is that of `data_recipes/sample.toml`: 5 x 5 views of 96 x 144 pixels, GRBG, 2000 photons in each. It
+    is read where the package is installed; `pcii sample -o DIR` copies it.
+
+    >>> dataset = sample()
+    >>> dataset.grid.shape_KLHW, dataset.cfa, dataset.analysis["z_mm"]
+    ((5, 5, 96, 144), 'GRBG', [540.0, 620.0])
+    >>> dataset.truth.names
+    {1: 'ball', 2: 'bird'}
+    """
+    return open_dataset(SAMPLE)
+
+
+def copy_sample(out: Path) -> None:
+    """Copy the sample dataset to the folder `out`; raises `InputError` unless that is new or empty."""
+    check_free(out, "dataset")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder_safely(out) as new:
+        shutil.copytree(SAMPLE, new, dirs_exist_ok=True)

@@ -1,7 +1,6 @@
 """The dataset folder on disk: its files, their arrays and its manifest.
 
-    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
-                             its own checksum (see `pcii.store.sealed_json`)
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
     counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
     counts.zarr/frame        (photon,) the frame of each count, on request
     counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
@@ -16,18 +15,20 @@ unfinished, a file whose hash differs is damaged, and what is not listed is not 
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.store.folder_kind import FolderKind
+from pcii.store.folders import FolderKind
+
+if TYPE_CHECKING:
+    from pcii.store.manifests import DatasetManifest
 
 MANIFEST = "manifest.json"
 CARD = "README.md"
-"""What people read of a dataset or collection. No manifest lists it, since it may be written again with
-other terms of use."""
+"""What people read of a dataset or collection. No manifest lists it: its terms of use may change."""
 MARKER = ".unfinished.json"
 """Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"
@@ -46,6 +47,7 @@ DATASET_FOLDER = FolderKind(
     absent=f"not a finished dataset (no {MANIFEST}); make one with `simgen generate`",
     remedy=REMEDY,
     marks=frozenset({MANIFEST, MARKER}),
+    has_checksum=True,
 )
 
 
@@ -75,28 +77,18 @@ def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
     DATASET_FOLDER.write(root, manifest)
 
 
-def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a finished dataset, with all fields checked that this package uses.
-
-    Raises `InputError` if the dataset is unfinished, and as `read_written_manifest` does.
-    """
+def read_manifest(root: Path) -> "DatasetManifest":
+    """The manifest of a finished dataset; `InputError` if it is unfinished, or the manifest is damaged."""
     if (root / MARKER).is_file():
         raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
     return read_written_manifest(root)
 
 
-def read_written_manifest(root: Path) -> dict[str, Any]:
-    """The manifest that was written last, with all fields checked that this package uses.
+def read_written_manifest(root: Path) -> "DatasetManifest":
+    """The manifest that was written last, whether or not another process marks the dataset as its own."""
+    from pcii.store.manifests import DatasetManifest
 
-    For a process that knows that the dataset is finished: another one may mark it as its own for the moment
-    until it finds so. Raises `InputError` if the manifest is missing, was changed since it was written, or
-    has an invalid field.
-    """
-    from pcii.store.manifest_schema import DatasetManifest, validate
-
-    manifest = DATASET_FOLDER.read(root)
-    validate(DatasetManifest, manifest, root / MANIFEST, REMEDY)
-    return manifest
+    return DATASET_FOLDER.read(root, DatasetManifest)
 
 
 def write_exr_safely(path: Path, image: np.ndarray) -> None:
@@ -133,24 +125,17 @@ def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
     import OpenEXR
 
     try:
-        if shape is not None and _exr_shape(path) != tuple(shape):
-            raise InputError(f"{path}: expected an image {tuple(shape)}, got {_exr_shape(path)}")
+        with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
+            (left, top), (right, bottom) = (map(int, corner) for corner in file.header()["dataWindow"])
+            has_y = any(channel.name == "Y" for channel in file.header()["channels"])
+        names = ("Y",) if has_y else ("R", "G", "B")
+        size = (bottom - top + 1, right - left + 1, len(names))
+        if shape is not None and size != tuple(shape):
+            raise InputError(f"{path}: expected an image {tuple(shape)}, got {size}")
         with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
             channels = file.channels()
-            names = ("Y",) if "Y" in channels else ("R", "G", "B")
             return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
     except InputError:
         raise
     except (KeyError, RuntimeError, TypeError, ValueError) as fault:
         raise InputError(f"{path}: cannot be read as an EXR image ({fault})") from None
-
-
-def _exr_shape(path: Path) -> tuple[int, int, int]:
-    """Shape (H, W, C) according to the header of an EXR file."""
-    import OpenEXR
-
-    with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
-        header = file.header()
-        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
-        is_mosaic = any(channel.name == "Y" for channel in header["channels"])
-    return bottom - top + 1, right - left + 1, 1 if is_mosaic else 3

@@ -1,6 +1,6 @@
 """Datasets written from images and truth in memory: whole folders that `open_dataset` opens."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,39 +12,25 @@ from pcii.base.safe_files import named_in_errors, replace_folder, temporary_fold
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import (
     COUNTS,
-    DATASET_FOLDER,
     FRAME,
     PHOTON_TRUTH,
     RADIANCE,
-    REMEDY,
     TRUTH,
     radiance_name,
-    read_manifest,
     write_exr_safely,
     write_manifest,
 )
-from pcii.store.file_list import check_files, list_files
-from pcii.store.given_truth import (
-    as_stored,
-    check_origins,
-    check_texts,
-    check_truth,
-    checked_depths,
-    stored_maps,
-)
-from pcii.store.hashes import hash_json
+from pcii.store.folders import check_free, hash_json, list_files
 from pcii.store.software import PACKAGE, versions
 from pcii.store.zarr_groups import DTYPES, write_arrays_safely
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
-from pcii.types.arrays import MOST_DEPTHS, check_z_mm
+from pcii.types.arrays import check_z_mm
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
-LARGEST_BUDGET = 1 << 53
-"""Of larger whole numbers doubles, and so JSON, no longer hold every one."""
 
 
 def save_dataset(
@@ -72,10 +58,8 @@ def save_dataset(
     and `radiance_unit` what numbers of radiance are. `title`, `licence`, `citation` and `origin` (where the
     images come from) are shown in reports.
 
-    The folder is complete or is not there. Its identity is a hash of the content of its files, the grid and
-    the objects' names; a folder that holds this very dataset keeps its files, and takes over a new budget,
-    new suggested depths and texts. Raises `InputError` for a folder that holds anything else, before anything
-    is written, and for parts that do not belong together.
+    The folder, which must be new or empty, is complete or is not there. Its identity is a hash of the content
+    of its files, the grid and the objects' names. Raises `InputError` for parts that do not belong together.
 
     >>> from tempfile import TemporaryDirectory
     >>> from pcii.types.camera_grid import CameraGrid
@@ -85,58 +69,42 @@ def save_dataset(
     ...     save_dataset(Path(folder) / "mine", counts, z_mm=500, title="Two views").counts.total
     48
     """
+    from pcii.store.manifests import DatasetManifest, validated
+
     counts, views = _counts_and_views(images)
-    analysis = _analysis(z_mm, z_range_mm)
-    if photon_budget is not None:
-        photon_budget = check_budget(photon_budget)
-        if counts is None:
-            raise InputError("photon_budget: is of photon counts, and these images are radiance alone")
-    texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
+    if photon_budget is not None and not (counts is not None and photon_budget > 0):
+        raise InputError("photon_budget: expected photons above 0, of images that are photon counts")
+    stated: dict[str, Any] = {"title": title, "licence": licence, "citation": citation, "origin": origin}
     if radiance_unit is not None:
-        texts["radiance_unit"] = radiance_unit
-    check_texts(texts)
-    if truth is not None:
-        check_truth(truth, counts or views)
+        stated["radiance_unit"] = radiance_unit
+    maps = {} if truth is None else _stored_maps(truth, counts or views)
     if view_z_mm is not None:
-        view_z_mm = checked_depths(view_z_mm, counts or views)
+        maps["view_z_mm"] = _checked_depths(view_z_mm, counts or views)
+    analysis: dict[str, Any] = {} if z_mm is None else {"z_mm": check_z_mm(z_mm).tolist()}
+    if z_range_mm is not None:
+        analysis["z_range_mm"] = check_depth_range(z_range_mm)
     out = Path(path).absolute()
+    check_free(out, "dataset")
     with named_in_errors(out):
-        held_dataset(out, None, content=False)
         out.parent.mkdir(parents=True, exist_ok=True)
         with temporary_folder(out) as new:
-            _write_parts(new, counts, views, truth, view_z_mm)
-            manifest = _content(new, counts, views, truth)
-            software = versions(PACKAGE, "numpy", "zarr")
-            told = {"analysis": analysis, "photon_budget": photon_budget, "versions": software}
-            write_manifest(new, texts | manifest | told)
-            held = held_dataset(out, manifest["identity"])
-            if held is None:
-                replace_folder(new, out)
-            elif held != read_manifest(new):
-                write_manifest(out, read_manifest(new))
+            if counts is not None:
+                write_counts(new / COUNTS, counts)
+            if views is not None:
+                _write_radiance(new, views)
+            if maps:
+                write_arrays_safely(new / TRUTH, maps, TRUTH_LABELS)
+            if truth is not None and truth.photons is not None:
+                _check_origins(truth.photons, counts)
+                ids = np.asarray(truth.photons.object_id).astype(np.int32)
+                write_photon_truth(new / PHOTON_TRUTH, ids, _as_stored(truth.photons.z_mm))
+            manifest = stated | _content(new, counts, views, truth)
+            manifest |= {"analysis": analysis, "photon_budget": photon_budget and float(photon_budget)}
+            manifest |= {"versions": versions(PACKAGE, "numpy", "zarr")}
+            validated(DatasetManifest, manifest)
+            write_manifest(new, manifest)
+            replace_folder(new, out)
     return open_dataset(path)
-
-
-def _write_parts(
-    folder: Path,
-    counts: PhotonCounts | None,
-    views: Views | None,
-    truth: Truth | None,
-    view_z_mm: np.ndarray | None,
-) -> None:
-    if counts is not None:
-        write_counts(folder / COUNTS, counts)
-    if views is not None:
-        _write_radiance(folder, views)
-    maps = {} if truth is None else stored_maps(truth)
-    if view_z_mm is not None:
-        maps["view_z_mm"] = view_z_mm
-    if maps:
-        write_arrays_safely(folder / TRUTH, maps, TRUTH_LABELS)
-    if truth is not None and truth.photons is not None:
-        check_origins(truth.photons, counts)
-        ids = np.asarray(truth.photons.object_id).astype(np.int32)
-        write_photon_truth(folder / PHOTON_TRUTH, ids, as_stored(truth.photons.z_mm))
 
 
 def write_counts(folder: Path, counts: PhotonCounts) -> None:
@@ -160,63 +128,21 @@ def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) ->
     write_arrays_safely(folder, {"object_id": object_id, "z_mm": z_mm}, PHOTON_TRUTH_LABELS)
 
 
-def held_dataset(out: Path, identity: str | None, *, content: bool = True) -> dict[str, Any] | None:
-    """The manifest of the finished dataset in the folder `out`; None if there is no folder, or an empty one.
-
-    Its files are compared by their hashes, without `content` by their sizes. Raises `InputError` for a file,
-    a folder that holds anything else, a dataset of another `identity` (if that is given), or a damaged one.
-    """
-    if not DATASET_FOLDER.guard(out):
-        return None
-    manifest = read_manifest(out)
-    if identity is not None and manifest.get("identity") != identity:
-        found = "the dataset of other images, or of another recipe or scene"
-        raise InputError(f"{out}: holds {found}; name a new or empty folder")
-    check_held(out, manifest, content=content)
-    return manifest
-
-
-def check_held(out: Path, manifest: Mapping[str, Any], *, content: bool) -> None:
-    """Raise `InputError` for a listed file that is missing or has another size, or, if `content`, hash.
-
-    The folder has to be deleted, since what is in it is kept as long as it is there.
-    """
-    check_files(out, manifest["files"], f"{REMEDY}, after deleting {out}", content=content)
-
-
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
     """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
-    given = images if isinstance(images, tuple | list) else [images]
-    counts = [one for one in given if isinstance(one, PhotonCounts)]
-    views = [one for one in given if isinstance(one, Views)]
-    if len(counts) + len(views) != len(given) or not given or len(counts) > 1 or len(views) > 1:
-        kinds = ", ".join(type(one).__name__ for one in given) or "nothing"
+    parts = images if isinstance(images, tuple | list) else [images]
+    counts = [part for part in parts if isinstance(part, PhotonCounts)]
+    views = [part for part in parts if isinstance(part, Views)]
+    if len(counts) + len(views) != len(parts) or not parts or len(counts) > 1 or len(views) > 1:
+        kinds = ", ".join(type(part).__name__ for part in parts) or "nothing"
         raise InputError(f"images: expected PhotonCounts, Views, or one of each, got {kinds}")
-    if not counts:
-        return None, views[0]
-    if not views:
-        return counts[0], None
-    (seen,), (light,) = counts, views
-    if seen.grid != light.grid:
-        raise InputError("images: the photon counts and the views are of different camera grids")
-    if light.radiance.shape[4] == 1 and light.cfa != seen.cfa:
-        raise InputError(
-            f"images: the views are of the Bayer pattern {light.cfa}, the counts of {seen.cfa}; "
-            "give both the same cfa"
-        )
-    return seen, light
-
-
-def _analysis(z_mm: object, z_range_mm: object) -> dict[str, Any]:
-    """Suggested depths as the manifest has them; `InputError` for depths that cannot be."""
-    found: dict[str, Any] = {}
-    if z_mm is not None:
-        found["z_mm"] = check_z_mm(z_mm).tolist()
-        if len(found["z_mm"]) > MOST_DEPTHS:
-            raise InputError(f"z_mm: expected at most {MOST_DEPTHS} depths, got {len(found['z_mm'])}")
-    if z_range_mm is not None:
-        found["z_range_mm"] = check_depth_range(z_range_mm)
-    return found
+    if counts and views:
+        if counts[0].grid != views[0].grid:
+            raise InputError("images: the photon counts and the views are of different camera grids")
+        patterns = counts[0].cfa, views[0].cfa
+        if views[0].radiance.shape[4] == 1 and patterns[0] != patterns[1]:
+            raise InputError(f"images: expected the same Bayer pattern, got {patterns[0]} and {patterns[1]}")
+    return counts[0] if counts else None, views[0] if views else None
 
 
 def check_depth_range(z_range_mm: object) -> list[float]:
@@ -230,12 +156,39 @@ def check_depth_range(z_range_mm: object) -> list[float]:
     return [float(near), float(far)]
 
 
-def check_budget(photon_budget: object) -> float:
-    """The expected photons of a view; raises `InputError` for what is no number from 0 to 2^53."""
-    number = photon_budget if isinstance(photon_budget, int | float | np.integer | np.floating) else 0
-    if not 0 < number <= LARGEST_BUDGET:
-        raise InputError(f"photon_budget: expected photons, above 0 and up to 2^53, got {photon_budget!r}")
-    return float(number)
+def _stored_maps(truth: object, images: Any) -> dict[str, np.ndarray]:
+    """The maps of the virtual centre as they are stored; `InputError` unless they are of the images' size."""
+    if not isinstance(truth, Truth):
+        raise InputError(f"truth: expected Truth, got {type(truth).__name__}")
+    size = images.grid.height, images.grid.width
+    if truth.z_mm.shape != size or truth.object_id.dtype.kind not in "iu":
+        raise InputError(f"truth: expected depths and whole object ids of {size}, as the images")
+    maps = {"z_mm": _as_stored(truth.z_mm), "object_id": truth.object_id.astype(np.int32)}
+    optional = {name: getattr(truth, name) for name in OPTIONAL_MAPS}
+    return maps | {name: array for name, array in optional.items() if array is not None}
+
+
+def _as_stored(z_mm: np.ndarray) -> np.ndarray:
+    """Depths as float32, if they are that already, else as float64."""
+    return z_mm if z_mm.dtype == np.float32 else z_mm.astype(np.float64)
+
+
+def _checked_depths(view_z_mm: object, images: Any) -> np.ndarray:
+    """True depths of every view as float32; `InputError` unless they are of the images, and depths."""
+    shape, maps = images.grid.shape_KLHW, np.asarray(view_z_mm)
+    if maps.shape != shape or maps.dtype.kind not in "fiu" or not (maps > 0).all():
+        raise InputError(f"view_z_mm: expected depths of {shape}, above 0 mm, a miss being +inf")
+    return maps.astype(np.float32)
+
+
+def _check_origins(photons: PhotonTruth, counts: PhotonCounts | None) -> None:
+    """Raise `InputError` unless the origins are those of the counts, photon by photon."""
+    if counts is None:
+        raise InputError("truth: photons: there are no photon counts that they belong to")
+    events = counts.events
+    for name in "klij":
+        if not np.array_equal(getattr(photons, name), getattr(events, name).repeat(events.n)):
+            raise InputError("truth: photons: not those of the counts, in the order of their events")
 
 
 def _write_radiance(root: Path, views: Views) -> None:

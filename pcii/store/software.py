@@ -1,7 +1,4 @@
-"""The software that a result follows from: versions, hashes of sources, and how those differ.
-
-It decides what is kept: what other software made is made again, or, of datasets, refused.
-"""
+"""The software that a result follows from: versions, hashes of sources, and how those differ."""
 
 import hashlib
 import platform
@@ -14,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pcii.store.hashes import hash_file
+from pcii.store.folders import hash_file
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -38,21 +35,18 @@ def own_software() -> dict[str, str]:
 
 
 def software_of_entry_point(point: "EntryPoint") -> dict[str, str]:
-    """Version and source of the package that an entry point is of, and versions of what it requires.
-
-    Not kept for a second call: the source may be changed and loaded again while Python runs.
-    """
+    """Version and source, as it is now, of the package that an entry point is of."""
     package = point.dist
     modules = {point.module.partition(".")[0]}
     if package is None:
         return {f"{_SOURCE}{point.module}": hash_of_source(_places(modules))}
     modules |= set((package.read_text("top_level.txt") or "").split())
-    found = {package.name: package.version, f"{_SOURCE}{package.name}": hash_of_source(_places(modules))}
+    software = {package.name: package.version, f"{_SOURCE}{package.name}": hash_of_source(_places(modules))}
     for requirement in package.requires or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            software[name] = version(name)
+    return software
 
 
 def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:

@@ -25,25 +25,12 @@ def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
 
 
 def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
-    """Raise `InputError` if no neighbouring views overlap at one of the depths, as where metres are given.
-
-    There every camera sees other points than the next, so that nothing can be in focus.
-    """
-    sides = ((grid.cols, grid.width), (grid.rows, grid.height))
-    if grid.view_count == 1:
-        return
-
-    def overlap(z_mm: np.ndarray) -> np.ndarray:
-        shifts = zip(disparity_px(grid, z_mm), sides, strict=True)
-        return np.any([np.abs(px) < side for px, (cameras, side) in shifts if cameras > 1], axis=0)
-
-    for z in depths_mm[~overlap(depths_mm)][:1]:
-        across, down = disparity_px(grid, z)
-        metres = f"; if metres are meant, it is {1000 * z:g}" if overlap(1000 * z) else ""
-        raise InputError(
-            f"{name}: {z:g} mm is so near that no views overlap, of {grid.height} x {grid.width} px each and "
-            f"{down:.0f} x {across:.0f} px apart, rows x columns; depths are in mm{metres}"
-        )
+    """Raise `InputError` if no neighbouring views overlap at one of the depths: nothing is in focus there."""
+    across, down = (np.abs(px) for px in disparity_px(grid, depths_mm))
+    overlap = ((across < grid.width) & (grid.cols > 1)) | ((down < grid.height) & (grid.rows > 1))
+    if grid.view_count > 1 and not overlap.all():
+        z = depths_mm[~overlap][0]
+        raise InputError(f"{name}: {z:g} mm is so near that no views overlap; depths are in mm")
 
 
 def depth_range_of(

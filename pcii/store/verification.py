@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from pcii.base.command_output import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, Stages, silent
-from pcii.store.collection_layout import (
+from pcii.store.collection import (
     COLLECTION,
     INDEX,
     check_manifest,
@@ -16,12 +16,22 @@ from pcii.store.collection_layout import (
     read_index,
 )
 from pcii.store.dataset_layout import CARD, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
-from pcii.store.evaluation_layout import EVALUATION_FOLDER, is_evaluation, read_evaluation
-from pcii.store.file_list import check_file, strays
-from pcii.store.results_list import REMEDY, RESULTS, read_results
+from pcii.store.folders import (
+    EVALUATION_FOLDER,
+    RESULTS,
+    RESULTS_FOLDER,
+    Files,
+    FolderKind,
+    check_file,
+    is_evaluation,
+    read_evaluation,
+    read_results,
+    unlisted_files,
+)
+from pcii.store.software import differences, own_software
 
 Item = TypeVar("Item")
-MOST_NAMED = 5
+MAX_NAMES = 5
 """Most unlisted files, or unfinished datasets, that an error names."""
 
 
@@ -31,13 +41,14 @@ def verify(path: Path, report: Report = silent) -> int:
     Returns the number of files. Raises `InputError` that names the faults: files that are missing, truncated
     or changed, or that no manifest lists.
     """
-    if is_collection(path):
-        return _verify_collection(path, report)
-    return _verify_folder(path, report)
+    return _verify_collection(path, report) if is_collection(path) else _verify_folder(path, report)
 
 
 def verify_and_tell(path: Path, *, as_json: bool) -> None:
-    """Verify for a command: print the number of files or, as JSON, that and the fault, also raised."""
+    """Verify for a command: print the number of files or, as JSON, that and the fault, also raised.
+
+    Of results it also says how the software that made them differs from that of now.
+    """
     with Stages() as report:
         try:
             files = verify(path, report)
@@ -45,53 +56,58 @@ def verify_and_tell(path: Path, *, as_json: bool) -> None:
             if as_json:
                 answer_json({"folder": str(path), "files": None, "fault": str(fault)})
             raise
+    made_by = read_results(path).versions if (path / RESULTS).is_file() else {}
+    changes = differences(made_by, own_software()) if made_by else ""
     if as_json:
-        answer_json({"folder": str(path), "files": files, "fault": None})
+        answer_json({"folder": str(path), "files": files, "fault": None, "software": changes})
     else:
-        say(f"{path}: {files} files match the manifest")
+        say(f"{path}: {files} files match the manifest{changes and f'; other software made them: {changes}'}")
 
 
 def _verify_collection(path: Path, report: Report) -> int:
     """Compare the datasets of a collection with its index, and each with its manifest."""
     read_collection(path)
     rows = read_index(path)
-    files = _all_of(
-        rows, lambda row: 1 + _verify_folder(check_manifest(path, row), silent), "datasets", report
-    )
+
+    def check(row: Mapping[str, Any]) -> int:
+        return 1 + _verify_folder(check_manifest(path, row), silent)
+
+    files = _sum_over(rows, check, "datasets", report)
     listed = {COLLECTION, INDEX, CARD, *(row["path"] for row in rows)}
-    extra = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
-    begun = [name for name in extra if (path / name / MARKER).is_file()]
-    _refuse(path, [name for name in extra if name not in begun], INDEX)
-    if begun:
+    unlisted = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
+    unfinished = [name for name in unlisted if (path / name / MARKER).is_file()]
+    _refuse_unlisted(path, [name for name in unlisted if name not in unfinished], INDEX)
+    if unfinished:
         raise InputError(
-            f"{path}: not finished: {_named(begun)}; the same `simgen generate` command goes on with them; "
-            "the others match the index"
+            f"{path}: not finished: {_first(unfinished)}; the same `simgen generate` command goes on with "
+            "them; the others match the index"
         )
     return 2 + files
 
 
 def _verify_folder(path: Path, report: Report) -> int:
-    document, remedy, files = _document_of(path)
+    kind, files = _kind_and_files(path)
 
-    def check(listed: tuple[str, Mapping[str, Any]]) -> int:
-        check_file(path, *listed, remedy, content=True)
+    def check(item: tuple[str, Mapping[str, Any]]) -> int:
+        check_file(path, *item, kind.remedy, content=True)
         return 1
 
-    number = _all_of(list(files.items()), check, "files", report)
-    _refuse(path, strays(path, [document, *files, CARD]), document)
+    number = _sum_over(list(files.items()), check, "files", report)
+    _refuse_unlisted(path, unlisted_files(path, [kind.document, *files, CARD]), kind.document)
     return number
 
 
-def _document_of(path: Path) -> tuple[str, str, dict[str, Any]]:
-    """The document that lists the files of a folder, what to do if one is wrong, and the files."""
-    if not (path / MANIFEST).exists() and (path / RESULTS).exists():
-        return RESULTS, REMEDY, read_results(path)["files"]
-    if not (path / MANIFEST).exists() and is_evaluation(path):
-        return EVALUATION_FOLDER.document, EVALUATION_FOLDER.remedy, read_evaluation(path)["files"]
-    return MANIFEST, DATASET_FOLDER.remedy, read_manifest(path)["files"]
+def _kind_and_files(path: Path) -> tuple[FolderKind, Files]:
+    """What a folder that is no collection is taken for, and the files that its document lists."""
+    if not (path / MANIFEST).exists():
+        if (path / RESULTS).exists():
+            return RESULTS_FOLDER, read_results(path).files
+        if is_evaluation(path):
+            return EVALUATION_FOLDER, read_evaluation(path).files
+    return DATASET_FOLDER, read_manifest(path).files
 
 
-def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, report: Report) -> int:
+def _sum_over(items: Sequence[Item], check: Callable[[Item], int], what: str, report: Report) -> int:
     """Sum of the files that `check` compares of each item; raises `InputError` of the first that is wrong."""
     files, faults = 0, list[str]()
     for done, item in enumerate(items, start=1):
@@ -106,12 +122,14 @@ def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, repo
     return files
 
 
-def _refuse(path: Path, extra: list[str], name: str) -> None:
-    """Raise `InputError` if there are files or folders that `name` does not list."""
-    if extra:
-        raise InputError(f"{path}: not listed in {name}, and read by nothing: {_named(extra)}; move it away")
+def _refuse_unlisted(path: Path, unlisted: list[str], document: str) -> None:
+    """Raise `InputError` if there are files or folders that the document does not list."""
+    if unlisted:
+        raise InputError(
+            f"{path}: not listed in {document}, and read by nothing: {_first(unlisted)}; move it away"
+        )
 
 
-def _named(files: list[str]) -> str:
+def _first(names: list[str]) -> str:
     """The first few names of files or folders."""
-    return ", ".join(files[:MOST_NAMED]) + (", ..." if len(files) > MOST_NAMED else "")
+    return ", ".join(names[:MAX_NAMES]) + (", ..." if len(names) > MAX_NAMES else "")

@@ -9,7 +9,7 @@ from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from pcii.store.collection_layout import Half
+from pcii.store.collection import Half
 from simgen.app.scene_commands import (
     Json,
     Out,

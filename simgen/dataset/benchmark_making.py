@@ -24,10 +24,8 @@ from pcii.store.benchmark_layout import (
     differing_scores,
     published_certificate,
 )
-from pcii.store.collection import open_collection
-from pcii.store.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
-from pcii.store.evaluation_layout import read_evaluation
-from pcii.store.hashes import hash_json
+from pcii.store.collection import BENCHMARK_FIELDS, IN_FRAMES, Half, open_collection
+from pcii.store.folders import hash_json, read_evaluation
 from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection

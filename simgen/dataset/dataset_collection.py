@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import locked, named_in_errors, temporaries_of
-from pcii.store.collection_layout import (
+from pcii.store.collection import (
     COLLECTION,
     COLLECTION_FOLDER,
     INDEX,

@@ -10,8 +10,9 @@ from typing import Any
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import locked
 from pcii.store import software
-from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
-from pcii.store.dataset_writer import check_held
+from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, REMEDY, read_written_manifest
+from pcii.store.folders import check_files
+from pcii.store.manifests import DatasetManifest
 from pcii.store.software import PACKAGE
 
 DECISIVE = (PACKAGE, "mitsuba")
@@ -34,7 +35,7 @@ def other_versions(recorded: Mapping[str, str]) -> str:
     return software.differences(known, decisive_versions())
 
 
-def find_finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
+def find_finished(out: Path, identity: str, *, content: bool = True) -> DatasetManifest | None:
     """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
 
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
@@ -46,12 +47,13 @@ def find_finished(out: Path, identity: str, *, content: bool = True) -> dict[str
     return read_whole(out, identity, content=content)
 
 
-def read_whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
+def read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
     manifest = read_written_manifest(out)
-    if manifest.get("identity") != identity:
-        raise other_dataset(out, "dataset", manifest.get("versions", {}))
-    check_held(out, manifest, content=content)
+    if manifest.identity != identity:
+        raise other_dataset(out, "dataset", manifest.versions)
+    # The folder has to be deleted, since what is in it is kept as long as it is there.
+    check_files(out, manifest.files, f"{REMEDY}, after deleting {out}", content=content)
     return manifest
 
 

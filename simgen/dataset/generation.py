@@ -21,7 +21,8 @@ from pcii.store.dataset_layout import (
     read_written_manifest,
     write_manifest,
 )
-from pcii.store.file_list import list_files
+from pcii.store.folders import list_files
+from pcii.store.manifests import DatasetManifest
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
@@ -85,7 +86,7 @@ def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
     timings_s[stage] = round(timings_s.get(stage, 0.0) + time.perf_counter() - start, 3)
 
 
-def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> dict[str, Any]:
+def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> DatasetManifest:
     """Make the dataset of `recipe` in the folder `out`; return its manifest.
 
     Scenes are looked up in `recipe_folder`. An unfinished dataset of the same recipe is resumed, a finished
@@ -95,7 +96,7 @@ def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = si
     return find_finished(out, prepared.identity) or make(prepared, out, report, Reuse())
 
 
-def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[str, Any]:
+def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> DatasetManifest:
     """Make a dataset that is not finished yet; its manifest. See `generate` for what is refused.
 
     What it has in common with those made before with the same `reuse` is not made again. Raises

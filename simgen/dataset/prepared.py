@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pcii.store.dataset_layout import DATASET_FOLDER
-from pcii.store.hashes import hash_file, hash_json
+from pcii.store.folders import hash_file, hash_json
 from simgen.assets.asset_files import read_assets
 from simgen.base import random_streams as seeds
 from simgen.base.file_lookup import asset

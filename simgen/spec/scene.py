@@ -14,7 +14,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_serializer, mode
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import add_files_safely
-from pcii.store.folder_kind import entries
+from pcii.store.folders import entries
 from simgen.base.file_lookup import AssetName, asset, named_files
 from simgen.base.strict_models import (
     LARGEST_MM,

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
-from pcii.store.hashes import hash_json
+from pcii.store.folders import hash_json
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
 from simgen.spec.scene_lookup import find_scene, is_scene

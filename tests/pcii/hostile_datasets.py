@@ -14,7 +14,7 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, RADIANCE, TRUTH, write_manifest
-from pcii.store.file_list import list_files
+from pcii.store.folders import list_files
 
 HUGE_TEXT = "x" * 100_000
 VALUES: list[Any] = [

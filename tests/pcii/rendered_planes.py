@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pcii.store.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
-from pcii.store.file_list import list_files
+from pcii.store.folders import list_files
 from pcii.store.zarr_groups import write_arrays_safely
 from pcii.types.array_labels import TRUTH_LABELS
 from pcii.types.bayer import mosaic

@@ -1,5 +1,6 @@
 """A dataset of 2 x 3 views of 4 x 5 pixels as `simgen` lays it out, and ways to damage it."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from pcii.base.errors import InputError
 from pcii.store.dataset_layout import (
     COUNTS,
     FRAME,
+    MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
@@ -19,7 +21,7 @@ from pcii.store.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.store.file_list import list_files
+from pcii.store.folders import list_files
 from pcii.store.zarr_groups import write_arrays_safely
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 
@@ -82,3 +84,11 @@ def flip_a_bit(path: Path, bit: int) -> None:
     content = bytearray(path.read_bytes())
     content[bit // 8 % len(content)] ^= 1 << bit % 8
     path.write_bytes(content)
+
+
+def rewrite_manifest(root: Path, **members: Any) -> None:
+    """Write a manifest again with other members; one that is `...` is left out."""
+    manifest = json.loads((root / MANIFEST).read_text()) | members
+    write_manifest(
+        root, {name: value for name, value in manifest.items() if value is not ... and name != "sha256"}
+    )

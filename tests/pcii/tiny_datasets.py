@@ -7,7 +7,7 @@ import numpy as np
 from twins import unit_grid
 
 from pcii.store.dataset_layout import COUNTS, TRUTH, nested_name, write_manifest
-from pcii.store.file_list import list_files
+from pcii.store.folders import list_files
 from pcii.store.zarr_groups import write_arrays_safely
 from pcii.types.array_labels import COUNTS_LABELS, TRUTH_LABELS
 from pcii.types.estimates import Segmented

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ from pcii.app.results import (
 from pcii.base.errors import InputError
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.results_list import RESULTS, read_results
+from pcii.store.folders import RESULTS, read_results
+from pcii.store.manifests import DatasetManifest
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_counts import PhotonCounts
@@ -33,9 +35,10 @@ Z = np.array([0.5, 1.0])
 
 
 def dataset_of(tmp_path: Path, identity: str = "a") -> Dataset:
-    dense = np.random.default_rng(3).poisson(0.3, GRID.shape_KLHW)
-    dataset = Dataset(tmp_path / "data", {"identity": identity}, GRID, None)
-    vars(dataset)["counts"] = PhotonCounts.from_dense(dense, GRID)  # where the property has what it has read
+    counts = PhotonCounts.from_dense(np.random.default_rng(3).poisson(0.3, GRID.shape_KLHW), GRID)
+    members = {"identity": identity, "grid": asdict(GRID), "cfa": None, "files": {}}
+    dataset = Dataset(tmp_path / "data", DatasetManifest.model_validate(members))
+    vars(dataset)["counts"] = counts  # the place where the property keeps what it has read
     return dataset
 
 

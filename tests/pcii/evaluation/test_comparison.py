@@ -11,7 +11,7 @@ import numba as nb
 import numpy as np
 import pytest
 from slow_clock import SlowClock
-from stored_datasets import flip_a_bit
+from stored_datasets import flip_a_bit, rewrite_manifest
 from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
@@ -25,8 +25,8 @@ from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import overview
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
-from pcii.store.evaluation_layout import EVALUATION, ROWS
+from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest
+from pcii.store.folders import EVALUATION, ROWS
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap
 
@@ -151,9 +151,8 @@ def test_one_dataset_has_no_intervals(series: Path, tmp_path: Path, calls: list[
 
 def change_recipe(dataset: Path, **settings: Any) -> None:
     manifest = read_manifest(dataset)
-    manifest["recipe"] |= settings
-    manifest["identity"] += str(settings)
-    write_manifest(dataset, manifest)
+    identity = f"{manifest.identity} {settings}"
+    rewrite_manifest(dataset, recipe={**manifest.recipe, **settings}, identity=identity)
 
 
 def test_groups_of_one_title_are_labelled_by_the_settings_that_differ(
@@ -428,9 +427,9 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
         evaluate([], out)
     with pytest.raises(InputError, match="holds something else"):
         evaluate([series], series, methods=FAKES)
-    manifest = read_manifest(series / "seed_3")
-    manifest["files"] = {name: e for name, e in manifest["files"].items() if not name.startswith(TRUTH)}
-    write_manifest(series / "seed_3", manifest)
+    files = read_manifest(series / "seed_3").files
+    others = {name: entry for name, entry in files.items() if not name.startswith(TRUTH)}
+    rewrite_manifest(series / "seed_3", files=others)
     with pytest.raises(InputError, match="has no truth"):
         evaluate([series], out, methods=FAKES)
     assert calls == []
@@ -442,7 +441,7 @@ def test_depths_are_given_where_the_recipe_names_none(
 ) -> None:
     out = tmp_path / "out"
     for path in find_datasets([series]):
-        write_manifest(path, {**read_manifest(path), "analysis": {}})
+        rewrite_manifest(path, analysis={})
     command = ["evaluate", str(series), "-o", str(out), "--method", "by count"]
     assert command_line.run(cli.app, command) == 2
     assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err

@@ -13,6 +13,7 @@ import pytest
 from chromium import CHROMIUM
 from hostile_names import DO, NAMES, RAN
 from jinja2 import UndefinedError
+from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 
 from pcii.app.pipeline import Outcome, analyse
@@ -26,7 +27,6 @@ from pcii.evaluation.rows import claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import read_manifest, write_manifest
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import Segmented
 
@@ -78,9 +78,7 @@ def named(name: str) -> Any:
 def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     """Results of a dataset whose objects, title and folder have such names, by such methods."""
     root = write_dataset(tmp_path_factory.mktemp("data") / FOLDER, 1, {OWN: 5}, title=NAMES[0])
-    manifest = read_manifest(root)
-    manifest["objects"] = {str(number): name for number, name in enumerate(NAMES, start=1)}
-    write_manifest(root, manifest)
+    rewrite_manifest(root, objects={str(number): name for number, name in enumerate(NAMES, start=1)})
     dataset = open_dataset(root)
     with pytest.MonkeyPatch.context() as patch:
         for name in NAMES:

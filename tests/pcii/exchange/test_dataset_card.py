@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 from hostile_names import NAMES
 from markdown_it import MarkdownIt
-from stored_datasets import make_dataset
+from stored_datasets import make_dataset, rewrite_manifest
 
 from pcii.base.errors import InputError
 from pcii.exchange.dataset_card import CITATION, CREATOR, LICENCE, Terms, write_card
-from pcii.store.collection_layout import COLLECTION_FOLDER, index_row, write_index
+from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
-from pcii.store.sealed_json import write_sealed
 from pcii.store.verification import verify
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -56,7 +55,7 @@ def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
 
 def test_a_card_follows_the_data_and_the_terms_alone(tmp_path):
     root, other = make_dataset(tmp_path / "data"), make_dataset(tmp_path / "other")
-    write_sealed(other / MANIFEST, read_manifest(other) | {"timings_s": {"photons": 9.5}})
+    rewrite_manifest(other, timings_s={"photons": 9.5})
     for folder in (root, other):
         write_card(folder, Terms())
     assert (root / CARD).read_bytes() == (other / CARD).read_bytes()

@@ -9,7 +9,7 @@ import pytest
 from stored_datasets import DENSE, GRID, IDS, Z_MM, flip_a_bit, largest_file, make_dataset, one_sentence
 
 import pcii
-from pcii.store.collection_layout import COLLECTION_FOLDER, index_row, write_index
+from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest
 
 FORMATS = ("hci", "nerfstudio", "photoncube", "events")

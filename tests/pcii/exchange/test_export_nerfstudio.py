@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
+from stored_datasets import rewrite_manifest
 
 import pcii
-from pcii.store.dataset_layout import TRUTH, read_manifest, write_manifest
-from pcii.store.file_list import list_files
+from pcii.store.dataset_layout import TRUTH, read_manifest
+from pcii.store.folders import list_files
 from pcii.store.zarr_groups import write_arrays_safely
 from pcii.types.array_labels import TRUTH_LABELS
 
@@ -138,8 +139,7 @@ def test_poses_are_those_of_the_true_cameras_and_depth_is_along_their_axes(tmp_p
         "view_z_mm": np.full(grid.shape_KLHW, 600.0, np.float32),
     }
     write_arrays_safely(data / TRUTH, arrays, TRUTH_LABELS)
-    manifest = read_manifest(data)
-    write_manifest(data, manifest | {"files": manifest["files"] | list_files(data, [TRUTH])})
+    rewrite_manifest(data, files=read_manifest(data).files | list_files(data, [TRUTH]))
     posed = exported(data)
     assert "camera_grid" not in posed.top
     np.testing.assert_allclose(posed.poses[1, :3, 3], [0.0045, -0.002, -0.005])

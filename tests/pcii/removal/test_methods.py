@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import with_probes
-from pcii.store.sample_dataset import sample
+from pcii.store.dataset import sample
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 

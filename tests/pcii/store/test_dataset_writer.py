@@ -1,6 +1,5 @@
 """Datasets written from Python: what comes back, whose folder it is, and what is refused."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from hostile_names import NAMES
-from stored_datasets import DENSE, GRID, IDS, Z_MM, flip_a_bit, largest_file
+from stored_datasets import DENSE, GRID, IDS, Z_MM
 from twins import unit_grid
 
 from pcii.base.errors import InputError
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import COUNTS, MANIFEST
 from pcii.store.dataset_writer import save_dataset
-from pcii.store.file_list import strays
+from pcii.store.folders import unlisted_files
 from pcii.store.verification import verify
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -52,10 +51,10 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
         counts = PhotonCounts.from_events(*(getattr(EVENTS, name) for name in "klijn"), GRID, cfa="GRBG")
     images = (Views(LIGHT, GRID), counts)
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC0", "citation": "Me", "origin": "a camera"}
-    told: dict[str, Any] = {"z_mm": [540, 620], "z_range_mm": (450, 750), "photon_budget": 10}
-    made = save_dataset(tmp_path / "d", images, TRUTH, **told, **texts)
+    depths: dict[str, Any] = {"z_mm": [540, 620], "z_range_mm": (450, 750), "photon_budget": 10}
+    saved = save_dataset(tmp_path / "d", images, TRUTH, **depths, **texts)
     dataset = open_dataset(tmp_path / "d")
-    assert dataset.manifest == made.manifest
+    assert dataset.manifest == saved.manifest
     assert (dataset.grid, dataset.cfa, dataset.budgets) == (GRID, "GRBG", (10,))
     assert dataset.counts.is_sparse == sparse
     assert same_counts(dataset.counts, COUNTED)
@@ -71,7 +70,9 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     assert dataset.analysis == {"z_mm": [540, 620], "z_range_mm": [450, 750]}
     assert {name: dataset.manifest[name] for name in texts} == texts
     assert verify(tmp_path / "d") > 10
-    assert not strays(tmp_path, ["d/x", *(f"d/{name}" for name in [MANIFEST, *dataset.manifest["files"]])])
+    assert not unlisted_files(
+        tmp_path, ["d/x", *(f"d/{name}" for name in [MANIFEST, *dataset.manifest["files"]])]
+    )
 
 
 @pytest.mark.parametrize("cfa", [None, "GRBG"])
@@ -121,16 +122,6 @@ def test_the_identity_follows_from_the_content(tmp_path: Path) -> None:
     assert len({first, *(one.manifest["identity"] for one in others)}) == 6
 
 
-def test_the_same_dataset_again_keeps_its_files_and_takes_new_texts(tmp_path: Path) -> None:
-    save_dataset(tmp_path / "d", COUNTED, z_mm=500)
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "d").rglob("n/**/*")}
-    again = save_dataset(tmp_path / "d", COUNTED, z_mm=600, title="now with a title")
-    assert again.analysis == {"z_mm": [600]}
-    assert open_dataset(tmp_path / "d").manifest["title"] == "now with a title"
-    assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "d").rglob("n/**/*")}
-    assert [path.name for path in tmp_path.iterdir()] == ["d"]
-
-
 def test_an_empty_folder_is_filled_and_folders_above_are_made(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     assert save_dataset(tmp_path / "empty", COUNTED).counts.total == COUNTED.total
@@ -142,15 +133,10 @@ def test_a_folder_of_something_else_is_refused_and_untouched(tmp_path: Path) -> 
     (tmp_path / "thesis" / "thesis.tex").write_text("years of work")
     with pytest.raises(InputError, match="holds something else"):
         save_dataset(tmp_path / "thesis", COUNTED)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis"]
     save_dataset(tmp_path / "d", COUNTED)
-    before = (tmp_path / "d" / MANIFEST).read_bytes()
-    with pytest.raises(InputError, match="holds the dataset of other images"):
-        save_dataset(tmp_path / "d", Views(LIGHT, GRID))
-    assert (tmp_path / "d" / MANIFEST).read_bytes() == before
-    flip_a_bit(largest_file(tmp_path / "d", COUNTS), 80)
-    with pytest.raises(InputError, match="does not match"):
+    with pytest.raises(InputError, match="holds something else"):
         save_dataset(tmp_path / "d", COUNTED)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["d", "thesis"]
 
 
 def test_what_fails_on_the_way_leaves_nothing(tmp_path: Path) -> None:
@@ -161,30 +147,21 @@ def test_what_fails_on_the_way_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "folder", ["with space", "ünïcode 日本", "-o", "line\nbreak", "not\udcfftext", "%s{x}"]
-)
-def test_folders_may_have_any_name(tmp_path: Path, folder: str) -> None:
-    dataset = save_dataset(tmp_path / folder, (COUNTED, Views(LIGHT, GRID)), TRUTH)
+@pytest.mark.parametrize("folder", ["ünïcode 日本", "-o", "line\nbreak", "not\udcfftext", "%s{x}"])
+def test_folders_names_and_texts_may_be_anything(tmp_path: Path, folder: str) -> None:
+    names, text = dict(enumerate(NAMES, start=1)), NAMES[0] + NAMES[-1]
+    images = (COUNTED, Views(LIGHT, GRID))
+    dataset = save_dataset(tmp_path / folder, images, Truth(Z_MM, IDS, names), title=text, licence=text)
     assert dataset.views is not None
     assert dataset.views.view(1, 2).shape == (4, 5, 3)
-    assert verify(tmp_path / folder)
-
-
-def test_names_and_texts_of_strangers_are_kept_as_they_are(tmp_path: Path) -> None:
-    names = dict(enumerate(NAMES, start=1))
-    truth = Truth(Z_MM, IDS, names)
-    text = NAMES[0] + NAMES[-1]
-    dataset = save_dataset(tmp_path / "d", COUNTED, truth, title=text, licence=text, citation=text)
-    assert dataset.manifest["title"] == text
+    assert dataset.manifest.title == text
     assert dataset.truth is not None
     assert dataset.truth.names == names
-    json.loads((tmp_path / "d" / MANIFEST).read_text())
+    assert verify(tmp_path / folder)
 
 
 OTHER = unit_grid(2, 3, 4, 5, pitch_mm=(2.0, 2.0))
 BRIGHT = np.full((*GRID.shape_KLHW, 1), 1e300)
-UNNAMED: Any = {1: None}
 MISKEYED: Any = {1: "a", "b": "c"}
 SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
 
@@ -193,37 +170,24 @@ SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
     ("images", "options", "words"),
     [
         ((), {}, "images: expected PhotonCounts, Views, or one of each, got nothing"),
-        (DENSE, {}, "images: expected PhotonCounts, Views, or one of each, got ndarray"),
-        ((COUNTED, COUNTED), {}, "one of each, got PhotonCounts, PhotonCounts"),
-        ((COUNTED, None), {}, "one of each, got PhotonCounts, NoneType"),
         ((COUNTED, Views(LIGHT, OTHER)), {}, "different camera grids"),
-        ((COUNTED, Views(LIGHT[..., :1], GRID)), {}, "Bayer pattern None, the counts of GRBG"),
-        ((COUNTED, Views(LIGHT[..., :1], GRID, "RGGB")), {}, "Bayer pattern RGGB, the counts of GRBG"),
+        ((COUNTED, Views(LIGHT[..., :1], GRID, "RGGB")), {}, "same Bayer pattern, got GRBG and RGGB"),
         (Views(BRIGHT, GRID), {}, r"view \(0, 0\) is too bright"),
         (COUNTED, {"z_mm": [0]}, "z_mm: a depth must be"),
-        (COUNTED, {"z_mm": "near"}, "z_mm: expected depths"),
-        (COUNTED, {"z_mm": np.arange(1, 10_002)}, "z_mm: expected at most 10000 depths, got 10001"),
-        (COUNTED, {"photon_budget": 0}, "photon_budget: expected photons, above 0 and up to"),
-        (COUNTED, {"photon_budget": "many"}, "photon_budget: expected photons, above 0 .* got 'many'"),
-        (Views(LIGHT, GRID), {"photon_budget": 10}, "photon_budget: is of photon counts"),
+        (COUNTED, {"z_mm": np.arange(1, 10_002)}, "z_mm: List should have at most 10000"),
+        (COUNTED, {"photon_budget": 0}, "photon_budget: expected photons above 0"),
+        (Views(LIGHT, GRID), {"photon_budget": 10}, "photon_budget: expected photons above 0, of images"),
         (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: expected two depths"),
-        (COUNTED, {"z_range_mm": (450,)}, "z_range_mm: expected two depths"),
-        (COUNTED, {"z_range_mm": (0, np.nan)}, "z_range_mm: expected two depths"),
-        (COUNTED, {"z_range_mm": 5}, "z_range_mm: expected two depths"),
         (COUNTED, {"title": 3}, "title: expected text, got int"),
-        (COUNTED, {"licence": b"CC0"}, "licence: expected text, got bytes"),
         (COUNTED, {"truth": Z_MM}, "truth: expected Truth, got ndarray"),
-        (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected maps of \(4, 5\)"),
-        (
-            COUNTED,
-            {"truth": Truth(Z_MM, IDS, MISKEYED)},
-            "object id up to 999999999, got 'b'",
-        ),
-        (COUNTED, {"truth": Truth(Z_MM, IDS, {1: "a", 10**9: "c"})}, "got 1000000000"),
-        (COUNTED, {"truth": Truth(Z_MM, IDS, UNNAMED)}, "names: expected text"),
-        (COUNTED, {"truth": Truth(Z_MM, IDS.astype(float), {1: "a"})}, "ids that are whole numbers"),
+        (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected .* of \(4, 5\)"),
+        (COUNTED, {"truth": Truth(Z_MM, IDS, MISKEYED)}, "objects.b: "),
+        (COUNTED, {"truth": Truth(Z_MM, IDS, {1: "a", 10**9: "c"})}, "objects.1000000000: "),
+        (COUNTED, {"truth": Truth(Z_MM, IDS.astype(float), {1: "a"})}, "whole object ids"),
         (COUNTED, {"truth": replace(TRUTH, photons=SHUFFLED)}, "not those of the counts"),
         (Views(LIGHT, GRID), {"truth": TRUTH}, "no photon counts that they belong to"),
+        (COUNTED, {"view_z_mm": np.ones((2, 3, 5, 4))}, "view_z_mm: expected depths of"),
+        (COUNTED, {"view_z_mm": np.full(GRID.shape_KLHW, np.nan)}, "view_z_mm: expected depths of"),
     ],
 )
 def test_what_does_not_go_together_is_refused_in_a_sentence(tmp_path: Path, images, options, words) -> None:
@@ -243,18 +207,3 @@ def test_depths_of_every_view_are_kept_with_and_without_a_virtual_centre(tmp_pat
         assert (dataset.truth is None) == (truth is None)
         assert dataset.manifest["radiance_unit"] == "cd/m^2"
         assert verify(tmp_path / name) > 2
-
-
-@pytest.mark.parametrize(
-    ("view_z_mm", "told"),
-    [
-        (np.ones((2, 3, 5, 4)), "expected real depths of"),
-        (np.ones(GRID.shape_KLHW, complex), "expected real depths of"),
-        (np.zeros(GRID.shape_KLHW), "above 0 mm and never NaN"),
-        (np.full(GRID.shape_KLHW, np.nan), "above 0 mm and never NaN"),
-    ],
-)
-def test_depths_of_views_that_cannot_be_are_refused(tmp_path: Path, view_z_mm, told) -> None:
-    with pytest.raises(InputError, match=f"^view_z_mm: .*{told}"):
-        save_dataset(tmp_path / "d", COUNTED, view_z_mm=view_z_mm)
-    assert not (tmp_path / "d").exists()

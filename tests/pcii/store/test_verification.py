@@ -9,31 +9,29 @@ import pytest
 from stored_datasets import flip_a_bit, make_dataset
 from tiny_datasets import OWN, write_dataset
 
-from pcii.app.results import save_depth, writing
 from pcii.base.errors import InputError
-from pcii.evaluation.comparison import evaluate
-from pcii.store.collection_layout import COLLECTION_FOLDER, index_row, write_index
-from pcii.store.dataset import open_dataset
+from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import MANIFEST, read_manifest
-from pcii.store.verification import verify
-from pcii.types.estimates import DepthMap
+from pcii.store.folders import EVALUATION, RESULTS, RESULTS_FOLDER, ROWS, list_files, seal_evaluation
+from pcii.store.verification import verify, verify_and_tell
 
 
-def make_results(root: Path) -> Path:
-    """Results of a dataset that stands beside them."""
-    dataset = open_dataset(make_dataset(root.with_name("dataset")))
-    with writing(root, dataset) as folder:
-        save_depth(folder, DepthMap(np.full(dataset.grid.shape_HW, 540.0), np.ones(dataset.grid.shape_HW)))
-        (folder / "report.html").write_text("<!doctype html>")
+def make_results(root: Path, versions: dict[str, str] | None = None) -> Path:
+    """A report and a group of arrays as results."""
+    (root / "depth.zarr").mkdir(parents=True)
+    (root / "depth.zarr" / "zarr.json").write_text("{}")
+    (root / "report.html").write_text("<!doctype html>")
+    origin = {"dataset": "d", "identity": "abc", "light": None, "versions": versions or {}}
+    RESULTS_FOLDER.write(root, origin | {"files": list_files(root, ["depth.zarr", "report.html"])})
     return root
 
 
 def make_evaluation(root: Path) -> Path:
-    """Two methods on two datasets that stand beside it."""
-    data = root.with_name("data")
-    for seed in (3, 4):
-        write_dataset(data / f"seed_{seed}", seed, {OWN: 5 + seed})
-    evaluate([data], root, methods=["brightness", "variance"])
+    """Two rows and a page."""
+    root.mkdir()
+    (root / ROWS).write_text('{"identity": "a"}\n{"identity": "b"}\n')
+    (root / "evaluation.md").write_text("# Evaluation")
+    seal_evaluation(root, {"groups": []}, ["evaluation.md"])
     return root
 
 
@@ -64,25 +62,21 @@ def add(path: Path, rng: np.random.Generator) -> None:
     path.with_name(f"added-{rng.integers(1 << 30)}").write_bytes(rng.bytes(int(rng.integers(20))))
 
 
-def add_a_folder(path: Path, rng: np.random.Generator) -> None:
-    (path.parent / "added").mkdir()
-
-
 def append(path: Path, rng: np.random.Generator) -> None:
     path.write_bytes(path.read_bytes() + b"\n")
 
 
 @pytest.mark.parametrize("make", [make_dataset, make_collection, make_results, make_evaluation])
-@pytest.mark.parametrize("damage", [flip, truncate, delete, add, add_a_folder, append])
-def test_every_damage_to_every_file_is_found(
+@pytest.mark.parametrize("damage", [flip, truncate, delete, add, append])
+def test_every_damage_to_every_listed_file_is_found(
     tmp_path: Path, make: Callable[[Path], Path], damage: Callable[[Path, np.random.Generator], None]
 ) -> None:
     root, rng = make(tmp_path / "whole"), np.random.default_rng(5)
     names = [path.relative_to(root) for path in sorted(root.rglob("*")) if path.is_file()]
     assert verify(root) == len(names) - (make is not make_collection)  # a manifest is not in its own list
     for name in names:
-        if name.name == "results.json":  # not sealed: what it lists is checked
-            continue
+        if str(name) in (RESULTS, EVALUATION) and damage in (flip, append):
+            continue  # these lists have no checksum of themselves
         broken = tmp_path / "broken"
         shutil.copytree(root, broken)
         damage(broken / name, rng)
@@ -94,16 +88,20 @@ def test_every_damage_to_every_file_is_found(
 
 def test_several_faults_are_counted_and_the_first_is_described(tmp_path: Path) -> None:
     root = make_dataset(tmp_path / "d")
-    names = sorted(path for path in (root / "radiance").iterdir())
-    for path in names[:3]:
+    for path in sorted((root / "radiance").iterdir())[:3]:
         path.unlink()
     with pytest.raises(InputError, match=r"view_00_00\.exr: .* 2 more of \d+ files are wrong"):
         verify(root)
 
 
-def test_strays_are_named(tmp_path: Path) -> None:
+def test_files_that_no_manifest_lists_are_named(tmp_path: Path) -> None:
     root = make_dataset(tmp_path / "d")
-    (root / "counts.zarr" / "dense").mkdir()
+    (root / "counts.zarr" / "extra").touch()
     (root / "notes.txt").touch()
-    with pytest.raises(InputError, match=r"not listed in manifest\.json.*: counts\.zarr/dense/, notes\.txt;"):
+    with pytest.raises(InputError, match=r"not listed in manifest\.json.*: counts\.zarr/extra, notes\.txt;"):
         verify(root)
+
+
+def test_results_of_other_software_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    verify_and_tell(make_results(tmp_path / "r", {"numpy": "0.1"}), as_json=False)
+    assert "2 files match the manifest; other software made them: " in capsys.readouterr().out

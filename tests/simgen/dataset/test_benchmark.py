@@ -20,7 +20,7 @@ from pcii.store.benchmark_layout import (
     differing_scores,
     published_certificate,
 )
-from pcii.store.hashes import hash_json
+from pcii.store.folders import hash_json
 from pcii.store.verification import verify
 from simgen.app.commands import app
 from simgen.dataset.benchmark_making import (

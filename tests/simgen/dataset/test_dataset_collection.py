@@ -15,8 +15,7 @@ from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
 from pcii.store import software
-from pcii.store.collection import open_collection
-from pcii.store.collection_layout import COLLECTION, INDEX
+from pcii.store.collection import COLLECTION, INDEX, open_collection
 from pcii.store.dataset_layout import CARD, MARKER
 from pcii.store.verification import verify
 from simgen.app import commands as cli

@@ -485,5 +485,5 @@ def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None
 
 @pytest.mark.renders
 def test_a_budget_that_is_not_there_is_refused(nested_dataset: Path) -> None:
-    with pytest.raises(InputError, match=r"no photons of budget 31 here; there are 400, 30, 120"):
+    with pytest.raises(InputError, match=r"no photons of budget 31 here; there are 30, 120, 400"):
         open_dataset(nested_dataset).at_budget(31)

@@ -1,0 +1,247 @@
+"""Folders that list their files: hashes, lists of files, and the document that makes a folder a finished one.
+
+The document is JSON: its format and version, and, of all kinds but collections, every file with size and
+SHA-256. That of a dataset or a collection ends in "sha256", a checksum of itself: the SHA-256 of its bytes
+with 64 zeros in that place.
+
+results.json      of results: their dataset by name and identity, the light, the software
+evaluation.json   of an evaluation: the figures of its tables; beside it rows.jsonl, a line of JSON for each
+                  dataset, budget and method
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import json_bytes, write_bytes_safely
+
+if TYPE_CHECKING:
+    from pcii.store.manifests import EvaluationManifest, Manifest, ResultsManifest
+
+AnyManifest = TypeVar("AnyManifest", bound="Manifest")
+Files = Mapping[str, Mapping[str, Any]]
+"""Size (`bytes`) and hash (`sha256`) of files by their paths in a folder."""
+LARGEST_DOCUMENT_BYTES = 1 << 27
+"""JSON takes up to 30 times its length in memory."""
+RESULTS = "results.json"
+ROWS = "rows.jsonl"
+EVALUATION = "evaluation.json"
+_NO_CHECKSUM = "0" * 64
+
+
+def hash_bytes(content: bytes) -> str:
+    """SHA-256 of bytes, in hex."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file, in hex."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def hash_json(value: Any) -> str:
+    """SHA-256, in hex, of a value that JSON can hold; the order of members of objects does not matter.
+
+    >>> hash_json({"a": 1, "b": [2]}) == hash_json({"b": (2,), "a": 1})
+    True
+    """
+    return hash_bytes(json.dumps(value, sort_keys=True).encode())
+
+
+def list_files(root: Path, parts: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Size and SHA-256 of every file of the named parts (files or folders), by path relative to `root`."""
+    entries: dict[str, dict[str, Any]] = {}
+    for part in parts:
+        top = root / part
+        for file in [top] if top.is_file() else sorted(p for p in top.rglob("*") if p.is_file()):
+            name = file.relative_to(root).as_posix()
+            entries[name] = {"bytes": file.stat().st_size, "sha256": hash_file(file)}
+    return entries
+
+
+def lists_part(files: Iterable[str], part: str) -> bool:
+    """Whether any of the listed files is `part`, or lies in the folder of this name."""
+    return any(name == part or name.startswith(f"{part}/") for name in files)
+
+
+def check_file(root: Path, name: str, entry: Mapping[str, Any], remedy: str, *, content: bool) -> None:
+    """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
+    path = root / name
+    try:
+        if not path.is_file():
+            raise InputError(f"{path}: listed in the manifest but missing; {remedy}")
+        if (size := path.stat().st_size) != entry["bytes"]:
+            expected = f"{size} bytes where the manifest says {entry['bytes']}"
+            raise InputError(f"{path}: truncated or changed, {expected}; {remedy}")
+        if content and hash_file(path) != entry["sha256"]:
+            raise InputError(f"{path}: its content does not match the manifest's SHA-256; {remedy}")
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
+
+
+def check_files(root: Path, files: Files, remedy: str, *, content: bool) -> None:
+    """Raise `InputError` for the first listed file that is not as `check_file` wants it."""
+    for name, entry in files.items():
+        check_file(root, name, entry, remedy, content=content)
+
+
+def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
+    """Paths, relative to `root`, of the files in it that are not listed."""
+    present = {path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()}
+    return sorted(present - set(listed))
+
+
+def read_small(path: Path, limit: int, remedy: str) -> bytes:
+    """Content of a regular file of at most `limit` bytes; raises `InputError` for any other."""
+    if not path.is_file():
+        raise InputError(f"{path}: missing; {remedy}")
+    try:
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
+    if len(content) > limit:
+        raise InputError(f"{path}: larger than the {limit} bytes that such a file has at most; {remedy}")
+    return content
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """A kind of folder, such as that of a dataset, and the document that makes a folder a finished one."""
+
+    what: str
+    document: str
+    version: int
+    absent: str
+    """What errors say of a folder without the document."""
+    remedy: str
+    """How an error about a damaged document ends."""
+    marks: frozenset[str]
+    """Files of which every such folder has one, finished or not."""
+    passing: frozenset[str] = frozenset()
+    """Files that may be in a folder before it is one of this kind, as for a lock."""
+    has_checksum: bool = False
+    """Whether the document ends in a checksum of itself."""
+
+    @property
+    def format(self) -> str:
+        """Name of the document's format."""
+        return f"photon-integral-imaging {self.what}"
+
+    def guard(self, folder: Path) -> set[str]:
+        """Names of what is in a folder to be written to: none in a new one, else those of one of this kind.
+
+        Raises `InputError` for a file, and for a folder that holds something else.
+        """
+        names = entries(folder, self.what) - self.passing
+        names = {name for name in names if not name.startswith(f".{self.document}.")}  # left by a kill
+        if names and not names & self.marks:
+            raise InputError(f"{folder}: holds something else; name a new or empty folder")
+        return names
+
+    def write(self, folder: Path, content: Mapping[str, Any]) -> None:
+        """Write the document, atomically."""
+        document = {"format": self.format, "format_version": self.version, **content}
+        if not self.has_checksum:
+            write_bytes_safely(folder / self.document, json_bytes(document))
+            return
+        blank = json_bytes({**document, "sha256": _NO_CHECKSUM})
+        before, after = blank.rsplit(_NO_CHECKSUM.encode(), 1)
+        write_bytes_safely(folder / self.document, before + hash_bytes(blank).encode() + after)
+
+    def read(self, folder: Path, model: "type[AnyManifest]") -> "AnyManifest":
+        """The document as `model`; `InputError` if it is missing, changed, of another format, or no such."""
+        from pcii.store.manifests import validated
+
+        path = folder / self.document
+        if not folder.is_dir():
+            raise InputError(f"{folder}: there is no such {self.what} folder")
+        if not path.is_file():
+            raise InputError(f"{folder}: {self.absent}")
+        content = read_small(path, LARGEST_DOCUMENT_BYTES, self.remedy)
+        try:
+            document = json.loads(content)
+        except (ValueError, RecursionError) as fault:
+            raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); {self.remedy}") from None
+        if not isinstance(document, dict):
+            raise InputError(f"{path}: damaged, it is not a JSON object; {self.remedy}")
+        checksum = str(document.pop("sha256", None))
+        if self.has_checksum and not _fits_checksum(content, checksum):
+            raise InputError(f"{path}: changed since it was written, or of another release; {self.remedy}")
+        release = document.get("format"), document.get("format_version")
+        if release != (self.format, self.version):
+            wanted = f"a {self.format} of version {self.version}"
+            raise InputError(f"{path}: expected {wanted}, got {release[0]!r}, {release[1]!r}; {self.remedy}")
+        try:
+            return validated(model, document)
+        except InputError as fault:
+            raise InputError(f"{path}: {fault}; {self.remedy}") from None
+
+
+def _fits_checksum(content: bytes, checksum: str) -> bool:
+    """Whether a checksum is that of the document which it is the last member of."""
+    before, _, after = content.rpartition(checksum.encode(errors="replace"))
+    return hash_bytes(before + _NO_CHECKSUM.encode() + after) == checksum
+
+
+def entries(folder: Path, what: str) -> set[str]:
+    """Names in a folder for `what`, none if there is no folder; raises `InputError` for a file."""
+    try:
+        return {entry.name for entry in folder.iterdir()}
+    except FileNotFoundError:
+        return set()
+    except NotADirectoryError:
+        raise InputError(f"{folder}: this is a file; name a folder for the {what}") from None
+
+
+def check_free(folder: Path, what: str) -> None:
+    """Raise `InputError` unless a folder for `what` is new or empty."""
+    if entries(folder, what):
+        raise InputError(f"{folder}: holds something else; name a new or empty folder")
+
+
+RESULTS_FOLDER = FolderKind(
+    "results",
+    RESULTS,
+    version=3,
+    absent=f"not a folder of results (no {RESULTS}); name one that `pcii run` made",
+    remedy="make the results again in a new folder",
+    marks=frozenset({RESULTS}),
+)
+EVALUATION_FOLDER = FolderKind(
+    "evaluation",
+    EVALUATION,
+    version=1,
+    absent="unfinished; the same `pcii evaluate` command goes on from here",
+    remedy="repeat the `pcii evaluate` command, which writes it again",
+    marks=frozenset({ROWS}),
+)
+
+
+def read_results(out: Path) -> "ResultsManifest":
+    """The document of a folder of results; raises `InputError` if it is missing or damaged."""
+    from pcii.store.manifests import ResultsManifest
+
+    return RESULTS_FOLDER.read(out, ResultsManifest)
+
+
+def is_evaluation(path: Path) -> bool:
+    """Whether a folder holds an evaluation, finished or not."""
+    return (path / ROWS).exists() or (path / EVALUATION).exists()
+
+
+def seal_evaluation(out: Path, summary: Mapping[str, Any], pages: Sequence[str]) -> None:
+    """Write evaluation.json: this summary of the rows, and the hashes of the rows and of the named pages."""
+    EVALUATION_FOLDER.write(out, {**summary, "files": list_files(out, [ROWS, *pages])})
+
+
+def read_evaluation(out: Path) -> "EvaluationManifest":
+    """Content of evaluation.json; raises `InputError` if it is missing, not yet there or damaged."""
+    from pcii.store.manifests import EvaluationManifest
+
+    return EVALUATION_FOLDER.read(out, EvaluationManifest)

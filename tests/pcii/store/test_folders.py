@@ -1,0 +1,112 @@
+"""Whose folder it is, its document, its list of files, for every kind of folder alike."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+from stored_datasets import flip_a_bit, one_sentence
+
+from pcii.base.safe_files import write_bytes_safely
+from pcii.store.collection import COLLECTION_FOLDER
+from pcii.store.dataset_layout import DATASET_FOLDER
+from pcii.store.folders import (
+    EVALUATION_FOLDER,
+    RESULTS_FOLDER,
+    FolderKind,
+    check_file,
+    check_free,
+    list_files,
+    unlisted_files,
+)
+from pcii.store.manifests import Manifest
+
+KINDS = {kind.what: kind for kind in (DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER)}
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> FolderKind:
+    return KINDS[request.param]
+
+
+def test_new_and_empty_folders_and_those_of_its_kind_may_be_written_to(
+    kind: FolderKind, tmp_path: Path
+) -> None:
+    assert kind.guard(tmp_path / "new" / "deep") == kind.guard(tmp_path) == set()
+    (tmp_path / f".{kind.document}.x1.tmp").touch()  # left by a kill
+    assert kind.guard(tmp_path) == set()
+    for mark in kind.marks:
+        out = tmp_path / mark
+        out.mkdir()
+        (out / mark).touch()
+        (out / "part").touch()
+        assert kind.guard(out) == {mark, "part"}
+
+
+def test_what_else_there_is_is_refused(kind: FolderKind, tmp_path: Path) -> None:
+    file = tmp_path / "thesis.tex"
+    file.write_text("years of work")
+    for check in (kind.guard, lambda folder: check_free(folder, kind.what)):
+        assert "holds something else; name a new" in one_sentence(lambda c=check: c(tmp_path), tmp_path)
+        assert f"name a folder for the {kind.what}" in one_sentence(lambda c=check: c(file), file)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_document_comes_back_with_members_that_no_model_names(kind: FolderKind, tmp_path: Path) -> None:
+    kind.write(tmp_path, {"ångström": [1, 2.5, None]})
+    document = kind.read(tmp_path, Manifest)
+    assert document["ångström"] == document.get("ångström") == [1, 2.5, None]
+    assert document.get("absent", 3) == 3
+    with pytest.raises(KeyError):
+        document["absent"]
+
+
+def test_a_document_that_is_missing_or_of_others_is_refused(kind: FolderKind, tmp_path: Path) -> None:
+    path, nowhere = tmp_path / kind.document, tmp_path / "nowhere"
+    assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere, Manifest), nowhere)
+    assert kind.absent in one_sentence(lambda: kind.read(tmp_path, Manifest), tmp_path)
+    for change in ({"format": "of others"}, {"format_version": kind.version + 1}, {"format_version": None}):
+        kind.write(tmp_path, change)
+        assert f"expected a {kind.format}" in one_sentence(lambda: kind.read(tmp_path, Manifest), path)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"\xff": 1}', b'{"a":' * 100_000, b'{"a": ' + b"9" * 5000])
+def test_content_that_is_no_json_object_is_refused(kind: FolderKind, tmp_path: Path, content: bytes) -> None:
+    (tmp_path / kind.document).write_bytes(content)
+    assert "damaged" in one_sentence(lambda: kind.read(tmp_path, Manifest), tmp_path / kind.document)
+
+
+def test_every_bit_and_byte_of_the_manifest_of_a_dataset_is_guarded(tmp_path: Path) -> None:
+    DATASET_FOLDER.write(tmp_path, {"a": 1})
+    path = tmp_path / DATASET_FOLDER.document
+    content = path.read_bytes()
+    stated = json.loads(content)["sha256"]
+    assert hashlib.sha256(content.replace(stated.encode(), b"0" * 64)).hexdigest() == stated
+
+    def refused() -> None:
+        one_sentence(lambda: DATASET_FOLDER.read(tmp_path, Manifest), path)
+
+    for bit in range(8 * len(content)):
+        flip_a_bit(path, bit)
+        refused()
+        path.write_bytes(content)
+    for other in (*(content[:length] for length in range(len(content))), content + b"\n", 2 * content):
+        path.write_bytes(other)
+        refused()
+
+
+def test_files_are_listed_with_their_sizes_and_hashes(tmp_path: Path) -> None:
+    write_bytes_safely(tmp_path / "b" / "c.bin", b"abc")
+    write_bytes_safely(tmp_path / "a.bin", b"")
+    listed = list_files(tmp_path, ["b", "a.bin"])
+    # The SHA-256 of nothing and of "abc" are those of the standard's examples.
+    assert {name: (entry["bytes"], entry["sha256"][:16]) for name, entry in listed.items()} == {
+        "b/c.bin": (3, "ba7816bf8f01cfea"),
+        "a.bin": (0, "e3b0c44298fc1c14"),
+    }
+    flip_a_bit(tmp_path / "b" / "c.bin", 3)
+    check_file(tmp_path, "b/c.bin", listed["b/c.bin"], "again", content=False)
+    path = tmp_path / "b" / "c.bin"
+    one_sentence(lambda: check_file(tmp_path, "b/c.bin", listed["b/c.bin"], "again", content=True), path)
+    (tmp_path / "b" / "link").symlink_to(path)
+    assert unlisted_files(tmp_path, ["a.bin", "b/c.bin"]) == ["b/link"]
