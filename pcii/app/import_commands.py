@@ -11,17 +11,16 @@ from pcii.base.command_output import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.exchange.camera_fit import CameraFit, check_grid
-from pcii.exchange.image_folders import ViewOrder
 from pcii.exchange.import_requests import (
     Cameras,
     Lenses,
     Pair,
     PictureLight,
-    Source,
     WholePair,
     read,
     values_of,
 )
+from pcii.exchange.stated_cameras import ViewOrder
 from pcii.store.dataset_writer import check_depth_range, held_dataset, save_dataset
 from pcii.types.arrays import check_z_mm
 from pcii.types.images import Views
@@ -143,7 +142,7 @@ def import_dataset(
     held_dataset(out, None, content=False)
     notes: list[str] = []
     with Stages() as report:
-        imported = read(Source(source, report, notes.append), options)
+        imported = read(source, options, report=report, tell=notes.append)
         images: list[Views | PhotonCounts] = [imported.images]
         drawn = ""
         if photons is not None:

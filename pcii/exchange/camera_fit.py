@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from pcii.exchange.image_folders import AS_STORED, ViewOrder
+from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
 from pcii.imaging.blocks import block_sums, evenly_chosen
 from pcii.store.dataset_writer import check_depth_range
 from pcii.types.camera_grid import CameraGrid

@@ -18,8 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
-from pcii.exchange.image_folders import VIEWS, Tell, warn
+from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
+from pcii.exchange.stated_cameras import Tell, warn
 from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
@@ -123,15 +124,16 @@ def transforms_in(source: Path) -> Path | None:
 
 
 def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
-    """Read a transforms.json of anybody; a picture is opened only where the file does not say its size.
+    """Read a transforms.json of anybody, or that of a folder.
 
-    Intrinsics of a frame win over those at the top; without `fl_x` an angle of view tells the focal length.
+    A picture is opened only where the file does not say its size. Intrinsics of a frame win over those at the
+    top; without `fl_x` an angle of view tells the focal length.
     Places are divided by `applied_scale`. `tell` takes the names of members that are not used. Raises
     `InputError`, naming file and member, for what is missing or wrong, pixels that are not square, lenses
     that distort, frames of different size or focal length, matrices that are no poses, and paths that are
     used twice or lead out of the folder.
     """
-    file = Path(path)
+    file = transforms_in(Path(path)) or Path(path)
     document = _parsed(file)
     frames = document.frames
     if document.file_path is None:
@@ -143,11 +145,9 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
         for n, frame in enumerate(frames)
         for name in (frame.depth_file_path,)
     ]
-    for name, listed in (("file_path", paths), ("depth_file_path", depths)):
-        first: dict[Path, int] = {}
-        for number, one in enumerate(listed):
-            if one is not None and first.setdefault(one, number) != number:
-                raise InputError(f"{file}: frames.{number}.{name}: is that of frames.{first[one]} too")
+    if len({*paths}) < len(paths):
+        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
+        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
     if None in (document.w or frames[0].w, document.h or frames[0].h):
         if paths[0].suffix == ".npy":
             raise InputError(f"{file}: w, h: missing; the size of the pictures in pixels")

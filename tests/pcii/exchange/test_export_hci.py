@@ -136,7 +136,6 @@ def test_cameras_have_their_own_maps_and_an_even_grid_has_none_of_its_centre(tmp
         disparity = hci.pfm(f"gt_disp_lowres_Cam{3 * k + l:03d}.pfm")
         np.testing.assert_allclose(hci.disparity_px(depth), disparity, atol=1e-5)
     assert not (hci.folder / "gt_depth_lowres.pfm").exists()
-    assert "between cameras" in hci.readme
 
 
 def test_without_truth_no_disparities_are_known(tmp_path):
