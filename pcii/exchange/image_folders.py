@@ -137,17 +137,15 @@ def pages_of(
     return picture, order.arrange(pixels.reshape(*table, *pixels.shape[1:]))
 
 
-def pictures_of(
-    files: np.ndarray, tell: Tell, *, pages: bool = False
-) -> Iterator[tuple[tuple[int, ...], Picture]]:
+def pictures_of(files: np.ndarray, tell: Tell) -> Iterator[tuple[tuple[int, ...], Picture]]:
     """Pictures of one size and type, by camera (k, l), of files (K, L); `InputError` if one differs.
 
-    Pictures of several pages are refused unless `pages`. `tell` takes what else is in them.
+    `tell` takes what else is in them.
     """
     first, others = None, []
     for camera, path in np.ndenumerate(files):
         picture = picture_of(path, VIEWS)
-        if picture.pages > 1 and not pages:
+        if picture.pages > 1:
             raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
         first = first or (path.name, picture.layout())
         if picture.layout() != first[1]:

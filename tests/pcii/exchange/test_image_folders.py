@@ -10,7 +10,7 @@ import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
 
-from pcii import InputError, Optics, ViewOrder, Views, import_images
+from pcii import InputError, Optics, ViewOrder, import_images
 from pcii.base.srgb import srgb_to_linear
 from pcii.exchange.pixel_files import to_radiance
 
@@ -70,27 +70,6 @@ def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: 
     decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
     expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
     np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
-
-
-def test_palettes_are_colours(tmp_path: Path) -> None:
-    colours = Image.fromarray(numbers(0, 0) // 32 * 32).convert("P", palette=Image.Palette.ADAPTIVE)
-    colours.save(tmp_path / "0_0.png")
-    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)
-    np.testing.assert_allclose(seen, np.asarray(colours.convert("RGB")) / 255, rtol=1e-6)
-
-
-@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
-def test_compressed_tiff(tmp_path: Path, compression: str) -> None:
-    image = numbers(0, 0, np.uint16)
-    write(tmp_path / "0_0.tif", image, compression)
-    views = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear")
-    np.testing.assert_array_equal(np.rint(views.view(0, 0) * 65535), image)
-
-
-def test_jpeg_is_read(tmp_path: Path) -> None:
-    Image.fromarray(np.full((H, W, 3), 188, np.uint8)).save(tmp_path / "0_0.jpg", quality=100)
-    views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
-    np.testing.assert_allclose(views.view(0, 0), by_the_standard(188 / 255), rtol=0.02)
 
 
 def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) -> None:
@@ -198,11 +177,3 @@ def test_optics_take_a_sensor_or_a_pixel() -> None:
     for sizes in wrong:
         with pytest.raises(InputError, match="_mm: "):
             Optics(**lengths, **sizes)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_views_do_not_take_numbers_of_pictures_for_light(dtype) -> None:
-    grid = OPTICS.grid((1, 2, H, W))
-    with pytest.raises(InputError, match="is sRGB, not light"):
-        Views(np.ones((1, 2, H, W, 3), dtype), grid)
-    Views(srgb_to_linear(np.ones((1, 2, H, W, 3), dtype)), grid)

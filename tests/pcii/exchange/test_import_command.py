@@ -192,13 +192,6 @@ def test_options_that_do_not_go_with_a_source_are_refused(tmp_path, capsys, make
     check_refused(makers[make](tmp_path), tmp_path / "out", options, words, capsys)
 
 
-def test_a_sensor_without_colours_may_be_said_to_have_no_pattern(tmp_path: Path) -> None:
-    np.save(tmp_path / "in.npy", np.ones((2, 2, H, W), np.uint8))
-    told = ["--counts", "--cfa", "none", *CAMERAS]
-    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *told) == 0
-    assert open_dataset(tmp_path / "out").cfa is None
-
-
 # What is wrong: a folder, the options, and words of the one sentence
 
 Make = Callable[[Path], Any]
@@ -237,16 +230,6 @@ def turned(kind: str) -> Make:
         Image.new("RGB", (W, H)).save(root / "0_0.png", kind, exif=exif)
 
     return make
-
-
-def exr_of_two_parts(root: Path) -> None:
-    import OpenEXR
-
-    parts = [
-        OpenEXR.Part({}, {"RGB": np.ones((H, W, 3), np.float32)}, name=name) for name in ("left", "right")
-    ]
-    with OpenEXR.File(parts) as file:
-        file.write(str(root / "0_0.exr"))
 
 
 def frames(root: Path) -> Path:
@@ -300,15 +283,6 @@ def lens_picture(root: Path) -> Path:
     return root / "in.png"
 
 
-def npz(root: Path) -> Path:
-    np.savez(root / "in.npz", a=np.zeros(3), b=np.zeros(3))
-    return root / "in.npz"
-
-
-def stack(root: Path) -> None:
-    tifffile.imwrite(root / "0_0.tif", np.zeros((3, H, W), np.uint8), photometric="minisblack")
-
-
 def two_sizes(root: Path) -> None:
     for size in (H, H + 1):
         tifffile.imwrite(root / "0_0.tif", np.zeros((size, W), np.uint8), append=size > H)
@@ -332,17 +306,12 @@ FLOATS = EXR | {"dtype": np.float32}
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
-    ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; there are no files"),
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
     ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "missing of 5 x 5 views: 1_1.png"),
     ("pattern that leaves the folder", folder(), ["--pattern", "../{index}.png", *CAMERAS], "pattern: expected {row}"),
-    ("two of one view", folder(lambda r: write(r / "00_0.png", numbers(0, 0))), NAMED, "is of the same view as"),
     ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "too far apart for a grid"),
     ("no square", folder(lambda r: [p.rename(r / f"{n}.png") for n, p in enumerate(sorted(r.iterdir()))]), ["--pattern", "{index}.png", *CAMERAS], "6 views are no square grid; .*--grid"),
-    ("other grid", folder(), [*NAMED, "--grid", 3, 3], "gives 2 rows and 3 columns, not those of --grid"),
     ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
-    ("sensor and pixel", folder(), [*NAMED, "--pixel-mm", 1], "either the side of a pixel or the width"),
-    ("cfa unknown", folder(), [*NAMED, "--cfa", "RGB"], "cfa: there is no Bayer pattern"),
     ("mixed sizes", folder(lambda r: write(r / "1_1.png", numbers(0, 0)[:5])), NAMED, "5 x 8 px, .* where 0_0.png has 6 x 8"),
     ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
     ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
@@ -350,26 +319,20 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("cut off", folder(cut("1_0.png")), NAMED, "1_0.png: damaged or cut off"),
     ("no picture", folder(content("0_0.png", b"GIF89a" + bytes(99))), NAMED, "0_0.png: not a PNG, JPEG, TIFF or EXR"),
     ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "exceeds limit of"),
-    ("parts of EXR", folder(exr_of_two_parts, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: has 2 parts"),
     ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),
     ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
     ("another number of views", array(LIGHT[0]), [*CAMERAS, "--grid", 2, 3], "2 views are not 2 x 3"),
     ("pages of two sizes", folder(two_sizes, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "pictures of different sizes or types"),
     ("channels as pages", folder(channels, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
-    ("NaN in array", array(LIGHT * np.nan), CAMERAS, r"view \(0, 0\) holds NaN"),
-    ("objects", array(np.array([None, {}], dtype=object)), CAMERAS, "not a NumPy array"),
-    ("no array", file("in.npy", b"not an array"), CAMERAS, "not a NumPy array"),
     ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),
     ("other frames", frames, ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "1_0.tif: has frames uint8 .5, 6, 8., where .*0_0.tif has uint8 .7, 6, 8."),
     ("counts in colour", folder(), [*NAMED, "--counts"], "has 3 channels; photon counts have one"),
     ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
     ("lenses beyond", lens_picture, ["--lens-array", 1, 2, "--lens-pitch-px", 4.5, 6, *CAMERAS], "reach to 8.75, and the picture is 8 px wide"),
-    ("no section", hci("[intrinsics]\n", ""), [], "not a file of parameters"),
     ("more cameras than views", hci("num_cams_x = 3", "num_cams_x = 4"), [], "missing of 3 x 4 views: input_Cam009.png, input_Cam010.png, input_Cam011.png"),
     ("byte order", hci(maps=swapped), [], "the sign of the scale in its header"),
     ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 8 x 6 px, .* and the views 6 x 8"),
-    ("depth 0", hci(maps=true_depth(np.zeros((H, W)))), [], "depths are not between"),
 ]  # fmt: skip
 
 

@@ -240,38 +240,8 @@ def views(array: np.ndarray) -> Make:
     return make
 
 
-def stack(array: np.ndarray) -> Make:
-    def make(root: Path) -> Path:
-        np.save(root / "in.npy", array)
-        return root / "in.npy"
-
-    return make
-
-
-def header_alone(root: Path) -> Path:
-    """A header that promises 2^60 frames."""
-    folder = files_of(root / "views", BITS)
-    with (folder / "0_0.npy").open("wb") as file:
-        header = {"descr": "|u1", "fortran_order": False, "shape": (1 << 60, 11, 2)}
-        np.lib.format.write_array_header_1_0(file, header)
-    return folder
-
-
-def cut(root: Path) -> Path:
-    folder = files_of(root / "views", BITS)
-    (folder / "0_1.npy").write_bytes((folder / "0_1.npy").read_bytes()[:-1])
-    return folder
-
-
 def missing(folder: Path) -> Path:
     (folder / "01_02" / "frames.npy").unlink()
-    return folder
-
-
-def archive(root: Path) -> Path:
-    folder = files_of(root / "views", BITS)
-    with (folder / "0_2.npy").open("wb") as file:
-        np.savez(file, frames=CUBE)
     return folder
 
 
@@ -288,21 +258,15 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("padding", cubes(w=12, cx=6), NO_OPTIONS, "bits beyond the 12 pixels of a row are set"),
     ("height", cubes(h=12, cy=6), NO_OPTIONS, "is 11 px high, and h is 12"),
     ("type", cube_with(CUBE.astype(np.int8)), NO_OPTIONS, "01_00/frames.npy: has frames int8"),
-    ("colour", cube_with(np.repeat(CUBE[..., None], 3, axis=3)), NO_OPTIONS, r"has frames uint8 \(9, 11, 2, 3\)"),
-    ("two axes", cube_with(CUBE[0]), NO_OPTIONS, r"has frames uint8 \(11, 2\)"),
     ("other frames", cube_with(CUBE[1:]), NO_OPTIONS, "01_00/frames.npy: has frames uint8 .8, 11, 2., where .*00_00/frames.npy has uint8 .9, 11, 2."),
     ("options of light", cubes(), ["--linear"], "--linear: not for .*, which is read as photon cubes with a transforms.json"),
     ("pattern twice", cubes(cfa="RGGB"), ["--cfa", "GRBG"], "cfa: is RGGB; leave out --cfa"),
     ("moving camera", one_camera(moves), NO_OPTIONS, "a moving camera is no grid"),
-    ("poses", one_camera(lambda d: d["frames"].pop()), NO_OPTIONS, "frames: says 8, and .* has 9"),
     ("missing", lambda root: missing(cubes()(root)), NO_OPTIONS, "01_02/frames.npy: cannot be read"),
-    ("an archive", archive, PACKED, "is an archive; save a .npy file"),
-    ("huge", header_alone, PACKED, "0_0.npy: not a NumPy array"),
     ("padding of files", views(CUBE), [*PACKED, "--width", 10], "bits beyond the 10 pixels of a row are set"),
     ("width of files", views(CUBE), [*PACKED, "--width", 17], "rows are of 9 to 16 pixels, and the stated width is 17"),
     ("with light", views(CUBE), ["--bitpack", "--srgb", "--pattern", "{row}_{col}.npy", *CAMERAS], "--srgb: not for"),
     ("width alone", views(CUBE), ["--counts", "--pattern", "{row}_{col}.npy", *CAMERAS, "--width", 13], "--width: is for packed frames"),
-    ("frames of an array", stack(BITS), ["--counts", "--frames", 0, 9, *CAMERAS], "has the frames 0 to 8"),
 ]  # fmt: skip
 
 

@@ -130,21 +130,6 @@ def test_depths_without_an_agreed_unit_are_left_out(tmp_path: Path, capsys) -> N
     )
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        (["--pitch-mm", 2, 2, "--shear-px", 1, 1], "--pitch-mm, --shear-px: not for"),
-        (["--focal-mm", 35, "--sensor-mm", 36], "give one of them"),
-        (["--grid", 2, 3], "--grid: not for"),
-        (["--flip-rows"], "--flip-rows: not for"),
-        (["--counts"], "--counts: not for"),
-        (["--pattern", "{row}_{col}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
-    ],
-)
-def test_options_that_do_not_go_with_it(tmp_path: Path, capsys, options, told) -> None:
-    assert told in refused(capsys, posed(tmp_path / "data"), *options)
-
-
 def test_pictures_that_do_not_fit(tmp_path: Path, capsys) -> None:
     source = posed(tmp_path / "a", w=W + 1)
     assert f"is {H} x {W} px, where transforms.json says {H} x {W + 1}" in refused(capsys, source)
