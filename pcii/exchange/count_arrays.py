@@ -135,20 +135,19 @@ def open_array(source: str | Path | np.ndarray, array: str | None = None) -> tup
 
 
 def _from_npz(path: Path, array: str | None) -> tuple[np.ndarray, str]:
-    with zipfile.ZipFile(path) as archive:
-        sizes = {member.filename.removesuffix(NUMPY): member.file_size for member in archive.infolist()}
-    if array is None and len(sizes) != 1:
-        raise InputError(f"{path}: has {len(sizes)} arrays; name one by --array: {', '.join([*sizes][:9])}")
-    chosen = array or next(iter(sizes))
-    if chosen not in sizes:
-        raise InputError(f"{path}: has no array {chosen!r}; there are {', '.join([*sizes][:9])}")
-    if sizes[chosen] > LARGEST_BYTES:
-        raise InputError(f"{path}: {chosen} unpacks to {sizes[chosen] >> 30} GiB; save it as a .npy file")
     try:
-        with np.load(path, allow_pickle=False) as loaded:
-            return loaded[chosen], f"{path}: {chosen}"
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as fault:
-        raise InputError(f"{path}: {chosen} cannot be read ({visible(str(fault))})") from None
+        with np.load(path, allow_pickle=False) as archive:
+            names = archive.files
+            name = names[0] if array is None and len(names) == 1 else array
+            if name is None or name not in names:
+                raise InputError(f"{path}: name one of its arrays by --array: {', '.join(names[:9])}")
+            if archive.zip.getinfo(name + NUMPY).file_size > LARGEST_BYTES:
+                raise InputError(f"{path}: {name} is larger than {LARGEST_BYTES >> 30} GiB; save a .npy file")
+            return archive[name], f"{path}: {name}"
+    except InputError:
+        raise
+    except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as fault:
+        raise InputError(f"{path}: cannot be read ({visible(str(fault))})") from None
 
 
 def _by_camera(

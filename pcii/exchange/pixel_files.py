@@ -202,8 +202,10 @@ def _read_pillow(path: Path, most_pixels: int) -> Picture:
         _check_pixels(image.height, image.width, most_pixels)
         stored = str(image.tile[0].args) if image.format == "PNG" else ""
         if image.mode not in PILLOW_MODES or stored in ("L;2", "L;4"):
-            raise InputError(f"a picture of the kind {stored or image.mode}; save it as RGB or 8-bit grey")
+            raise InputError(f"a {stored or image.mode} picture; save it as RGB or 8-bit grey")
         count, alpha = getattr(image, "n_frames", 1), image.has_transparency_data
+        if count != 1 and image.format != "MPO":  # a telephone's JPEG may have a preview
+            raise InputError(f"holds {count} pictures; give a file with one")
         unused = f"{count - 1} more pictures" if count != 1 else _profile(image.info.get("icc_profile"))
         image.load()  # a PNG may have its orientation after its pixels
         orientation = image.getexif().get(0x0112, UPRIGHT)

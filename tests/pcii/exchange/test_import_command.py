@@ -98,17 +98,6 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
 
 
-@pytest.mark.parametrize("options", [[], ["--swap-axes"]])
-def test_pages_of_photon_counts_are_views(tmp_path: Path, options: list[str]) -> None:
-    counts = np.random.default_rng(1).poisson(2, (2, 3, H, W)).astype(np.uint16)
-    stored = counts.swapaxes(0, 1) if options else counts  # down the columns
-    tifffile.imwrite(tmp_path / "in.tif", stored.reshape(6, H, W), photometric="minisblack")
-    told = ["--counts", "--grid", 2, 3, *CAMERAS, *options]
-    assert run("import", tmp_path / "in.tif", "-o", tmp_path / "out", *told) == 0
-    seen = open_dataset(tmp_path / "out").counts
-    np.testing.assert_array_equal([[seen.view(k, l) for l in range(3)] for k in range(2)], counts)
-
-
 def test_a_stage_that_moves_to_and_fro_is_noticed(photos: Path, tmp_path: Path, capsys) -> None:
     to_and_fro = [(k, 2 - l if k % 2 else l) for k, l in np.ndindex(3, 3)]
     told = pages(photos, tmp_path / "mine", to_and_fro)

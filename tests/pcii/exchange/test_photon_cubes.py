@@ -96,12 +96,6 @@ def test_cubes_of_all_cameras_come_in(tmp_path: Path, capsys, grid: CameraGrid, 
     check_counts(back.counts, bits_of(grid))
 
 
-def test_a_part_of_the_exposure(tmp_path: Path) -> None:
-    cubes = write_cubes(tmp_path, BITS, GRID)
-    assert run("import", cubes / "transforms.json", "-o", tmp_path / "part", "--frames", 2, 4) == 0
-    check_counts(open_dataset(tmp_path / "part").counts, BITS[:, :, 2:5])
-
-
 def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path, capsys) -> None:
     view = write_cubes(tmp_path, BITS, GRID) / "01_02"
     document = json.loads((view / "transforms.json").read_text())

@@ -144,8 +144,3 @@ def test_pictures_that_do_not_fit(tmp_path: Path, capsys) -> None:
     assert "holds NaN or depths below 0" in refused(capsys, source)
     source = posed(tmp_path / "f", file_path="frames.npy")
     assert "file_path: expected one in each frame" in refused(capsys, source)
-
-
-def test_statements_of_exports_are_named_and_not_used(tmp_path: Path, capsys) -> None:
-    imported(posed(tmp_path / "data", quantity="radiance", white=2.0, camera_grid={}))
-    assert "not used of transforms.json: quantity, white, camera_grid" in capsys.readouterr().out
