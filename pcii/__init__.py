@@ -14,8 +14,8 @@ from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
 from pcii.exchange.hci_scenes import import_hci
-from pcii.exchange.image_folders import Optics, ViewOrder, import_images
-from pcii.exchange.lens_arrays import LensArray, import_lens_array
+from pcii.exchange.image_folders import LensArray, import_images, import_lens_array
+from pcii.exchange.stated_cameras import Optics, ViewOrder
 from pcii.metrics.scoring import score
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep

@@ -10,17 +10,16 @@ from pcii.base.command_output import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.exchange.camera_fit import CameraFit, check_grid
-from pcii.exchange.image_folders import ViewOrder
 from pcii.exchange.import_requests import (
     Cameras,
     Lenses,
     Pair,
     PictureLight,
-    Source,
     WholePair,
     read,
     values_of,
 )
+from pcii.exchange.stated_cameras import ViewOrder
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
 from pcii.types.images import Views
@@ -125,7 +124,7 @@ def import_dataset(
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
-        imported = read(Source(source, report, notes.append), options)
+        imported = read(source, options, report=report, tell=notes.append)
         images: list[Views | PhotonCounts] = [imported.images]
         origin = imported.origin
         if photons is not None:

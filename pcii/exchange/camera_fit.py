@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from pcii.exchange.image_folders import AS_STORED, ViewOrder
+from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
 from pcii.imaging.blocks import block_sums, evenly_chosen
 from pcii.store.dataset_writer import check_depth_range
 from pcii.types.camera_grid import CameraGrid
@@ -34,23 +34,19 @@ BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0
 """Views are blurred, so that half cells do not matter, and lose what is smooth, such as vignetting."""
 BLUR_PLANES = 1.0
 """Of what is sharp at each plane, half a fine cell apart; with less one surface may be named twice."""
-WINDOW_CELLS = 5
-"""Side of the window over which the variance is averaged."""
-LEAST_SHARE = 0.6
-"""Share of the views that have to reach a cell, and of the cells that have to be reached in a window."""
-BETTER = 0.75
-"""An order is better than another one, or than chance, if at most this share of the variance remains."""
-SHARP = 0.5
-"""At a surface the variance is at most this share of its mean over the planes."""
-FEWEST_SHARP = 0.02
-"""Least share of the cells that have to be sharp anywhere."""
+WINDOW_CELLS, LEAST_SHARE = 5, 0.6
+"""Side of the window over which the variance is averaged; share of the views that have to reach a cell, and
+of the cells that have to be reached in a window."""
+BETTER, RANDOM_ORDERS = 0.75, 3
+"""An order is better than another one, or than random ones, if at most this share of the variance remains."""
+SHARP, FEWEST_SHARP = 0.5, 0.02
+"""At a surface the variance is at most this share of its mean over the planes; least share of such cells."""
 PEAK_SHARE, MOST_PEAKS = 0.08, 4
 """Least share of what is sharp that a depth has, and the largest number of depths."""
 BEHIND_SHARE = 0.12
 """Largest share of what seems sharp by chance behind the cameras."""
 RANGE_FACTOR = 4.0
 """How far beyond a stated range depths are looked at, as a factor of parallax."""
-RANDOM_ORDERS = 3
 
 
 @dataclass(frozen=True)
@@ -102,14 +98,16 @@ def check_grid(
         if _remaining(other_variance) < limit:
             variance, best_order, best_grid = other_variance, other, other_grid
             limit = _remaining(variance)
-    rng, by_chance = np.random.default_rng(0), []
-    for _ in range(RANDOM_ORDERS):
-        shuffled = rng.permutation(grid.view_count).reshape(table.shape)
-        by_chance.append(_remaining(_sweep(cells, shuffled, grid, shifts_px, side)))
-    mass, total_px = _mass(variance), shifts_px + _still_px(best_grid)
+    rng = np.random.default_rng(0)
+    by_chance = [
+        _remaining(_sweep(cells, rng.permutation(table.ravel()).reshape(table.shape), grid, shifts_px, side))
+        for _ in range(RANDOM_ORDERS)
+    ]
+    sharpness, is_sharp = _sharpness(variance)
+    mass, total_px = _by_plane(variance, sharpness * is_sharp), shifts_px + _still_px(best_grid)
     nearest_px = np.maximum(total_px[-1], side)
     fit = CameraFit(nearest_mm=float(depth_of_total_disparity_mm(grid, nearest_px)))
-    if not mass.any() or _remaining(variance) > BETTER * np.mean(by_chance):
+    if is_sharp.mean() < FEWEST_SHARP or _remaining(variance) > BETTER * np.mean(by_chance):
         return fit
     fit = replace(fit, order=None if best_order == order else best_order)
     if mass[total_px < -side].sum() > BEHIND_SHARE:
@@ -178,12 +176,10 @@ def _cells_of(images: Views | PhotonCounts, side: int) -> Callable[[int], np.nda
     def cells(number: int) -> np.ndarray:
         image = images.view(*divmod(number, images.grid.cols))
         h, w = (size // side for size in image.shape[:2])
-        largest = float(np.abs(image).max(initial=0))
-        if largest > 1e30 or 0 < largest < 1e-30:  # squares and sums in single precision
-            image = image / largest
-        image = image.mean(axis=2) if image.ndim == 3 else image
-        light = np.sqrt(np.maximum(block_sums(image[: h * side, : w * side], side, np.float32), 0))
-        light /= max(float(light.mean()), 1e-30)
+        image = image.mean(axis=2, dtype=np.float64) if image.ndim == 3 else image
+        sums = block_sums(image[: h * side, : w * side], side, np.float64)  # of any numbers of float32
+        light = np.sqrt(np.maximum(sums, 0))
+        light = (light / max(float(light.mean()), 1e-30)).astype(np.float32)
         return gaussian_filter(light, BLUR_CELLS) - gaussian_filter(light, BACKGROUND_CELLS)
 
     return cells
@@ -222,7 +218,8 @@ def _sweep(
         total, squares, number = (np.zeros((h, w), np.float32) for _ in range(3))
         for image, (dy, dx) in zip(images, of_views, strict=True):
             if abs(dy) < h and abs(dx) < w:
-                to, moved = (_overlap(h, dy), _overlap(w, dx)), image[_overlap(h, -dy), _overlap(w, -dx)]
+                to = slice(max(0, dy), h + min(0, dy)), slice(max(0, dx), w + min(0, dx))
+                moved = image[max(0, -dy) : h + min(0, -dy), max(0, -dx) : w + min(0, -dx)]
                 total[to] += moved
                 squares[to] += moved * moved
                 number[to] += 1
@@ -235,31 +232,18 @@ def _sweep(
     return variance
 
 
-def _overlap(size: int, shift: int) -> slice:
-    """Cells of an axis onto which others that move by `shift` fall."""
-    return slice(max(0, shift), size + min(0, shift))
-
-
-def _least_and_mean(variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least variance (h, w) over the planes, and its mean; 0 where no plane is known."""
-    known = np.isfinite(variance)
-    mean = np.where(known, variance, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.where(known.any(axis=0), variance.min(axis=0), 0), mean
-
-
 def _remaining(variance: np.ndarray) -> float:
     """Mean over the cells of the least variance."""
     covered = np.isfinite(variance).any(axis=0)
     return float(variance.min(axis=0)[covered].mean()) if covered.any() else np.inf
 
 
-def _mass(variance: np.ndarray) -> np.ndarray:
-    """How much is sharp at each plane (P,), with its sum 1; 0 if next to nothing is sharp at all."""
-    least, mean = _least_and_mean(variance)
-    sharpness = np.where(least < SHARP * mean, mean - least, 0)
-    if np.count_nonzero(sharpness) < FEWEST_SHARP * sharpness.size:
-        return np.zeros(len(variance))
-    return _by_plane(variance, sharpness)
+def _sharpness(variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By how much the least variance (h, w) is below its mean over the planes, and whether that is sharp."""
+    known = np.isfinite(variance)
+    mean = np.where(known, variance, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    least = np.where(known.any(axis=0), variance.min(axis=0), 0)
+    return mean - least, least < SHARP * mean
 
 
 def _by_plane(variance: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -294,14 +278,13 @@ def _refined_depths(
     planes = np.unique(np.concatenate([total_px[active] + step for step in np.arange(0, side, fine / 2)]))
     table = np.arange(grid.view_count).reshape(grid.rows, grid.cols)
     close = _sweep(_cells_of(images, fine), table, grid, planes - _still_px(grid), fine)
-    least, mean = _least_and_mean(close)
-    coarse_least, coarse_mean = _least_and_mean(variance)
-    is_sharp = active[variance.argmin(axis=0)] & (coarse_least < SHARP * coarse_mean)
+    contrast, _ = _sharpness(close)
+    is_sharp = active[variance.argmin(axis=0)] & _sharpness(variance)[1]
     of_fine = (
         np.minimum(np.arange(size) * fine // side, most - 1)
-        for size, most in zip(least.shape, is_sharp.shape, strict=True)
+        for size, most in zip(contrast.shape, is_sharp.shape, strict=True)
     )
-    weight = np.where(is_sharp[np.ix_(*of_fine)], mean - least, 0)
+    weight = np.where(is_sharp[np.ix_(*of_fine)], contrast, 0)
     fine_mass = gaussian_filter1d(_by_plane(close, weight), BLUR_PLANES, mode="constant")
     depths = []
     for peak in _peaks(fine_mass):

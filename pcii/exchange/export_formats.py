@@ -21,7 +21,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import json_bytes, named_in_errors, new_folder_safely
-from pcii.exchange.export_hci import write_hci
 from pcii.exchange.export_pictures import (
     TRANSFORMS,
     frames_of,
@@ -30,6 +29,7 @@ from pcii.exchange.export_pictures import (
     view_name,
     write_nerfstudio,
 )
+from pcii.exchange.hci_scenes import write_hci
 from pcii.store.collection import Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import check_free

@@ -30,14 +30,10 @@ UP_AND_BACK = np.diag([1.0, -1.0, -1.0])
 """Turns Y down, Z forward into Y up, Z backward; its own inverse, of determinant 1."""
 MM_PER_M = 1000.0
 TRANSFORMS = "transforms.json"
-DEPTH_UNIT = "depth_unit_scale_factor"
-"""Member with the unit, in metres, of the numbers in files of depth; named as nerfstudio's option."""
 DEPTH_UNIT_M = 1e-3
-"""That unit where there is no such member; nerfstudio's default."""
+"""Unit of the numbers in files of depth without a `depth_unit_scale_factor`; nerfstudio's default."""
 MOST_POSES = 1 << 16
 """Frames of a file: a photon cube of visionsim has a pose for each of its frames, a thousand or more."""
-OWN_GRID = "camera_grid"
-"""Member of the file with the camera grid in mm, which poses and pixels alone do not tell."""
 WHITE_QUANTILE = 0.999
 """Share of the values of the middle view that are at most white. A larger one makes pictures darker."""
 
@@ -62,40 +58,35 @@ def pictures_of(dataset: Dataset) -> ViewPictures:
 
     Raises `InputError` for a dataset with neither.
     """
-    return _photon_pictures(dataset) if dataset.views is None else _radiance_pictures(dataset, dataset.views)
+    if dataset.views is not None:
+        return _radiance_pictures(dataset, dataset.views)
+    counts = dataset.counts
+    white = max(int(counts.events.n.max(initial=0)), 1)
+    return ViewPictures(
+        lambda k, l: np.repeat(photon_numbers(counts.view(k, l), white)[..., None], 3, axis=2),
+        quantity="photons",
+        white=float(white),
+        unit="photons",
+        meaning=f"photon counts in grey, not gamma-encoded: 255 is {white} photons in the pixel",
+    )
 
 
 def _radiance_pictures(dataset: Dataset, views: Views) -> ViewPictures:
-    grid, cfa = dataset.grid, views.cfa
     unit = visible(str(dataset.manifest.radiance_unit or "radiance"))
 
     def colours(k: int, l: int) -> np.ndarray:
         image = views.view(k, l)
-        return image if cfa is None else demosaic(image[..., 0], cfa=cfa)
+        return image if views.cfa is None else demosaic(image[..., 0], cfa=views.cfa)
 
-    middle = colours(grid.rows // 2, grid.cols // 2)
+    middle = colours(views.grid.rows // 2, views.grid.cols // 2)
     white = float(np.float32(np.quantile(middle, WHITE_QUANTILE, method="lower")))
     white = white if white > 0 else 1.0
-    mosaic = "" if cfa is None else f"; the {cfa} mosaic is demosaiced by the method of Laroche and Prescott"
     return ViewPictures(
-        view=lambda k, l: to_srgb8(colours(k, l), white),
+        lambda k, l: to_srgb8(colours(k, l), white),
         quantity="radiance",
         white=white,
         unit=unit,
-        meaning=f"radiance, encoded as sRGB: 255 is {white:.6g} ({unit}) or more{mosaic}",
-    )
-
-
-def _photon_pictures(dataset: Dataset) -> ViewPictures:
-    counts = dataset.counts
-    white = max(int(counts.events.n.max(initial=0)), 1)
-    mosaic = "" if counts.cfa is None else f"; each pixel of the {counts.cfa} mosaic has one colour"
-    return ViewPictures(
-        view=lambda k, l: np.repeat(photon_numbers(counts.view(k, l), white)[..., None], 3, axis=2),
-        quantity="photons",
-        white=float(white),
-        unit="photons",
-        meaning=f"photon counts in grey, not gamma-encoded: 255 is {white} photons in the pixel{mosaic}",
+        meaning=f"radiance, encoded as sRGB: 255 is {white:.6g} ({unit}) or more; mosaics are demosaiced",
     )
 
 
@@ -132,7 +123,7 @@ def write_nerfstudio(dataset: Dataset, folder: Path) -> None:
     if pictures.quantity == "photons":
         pixels["cfa"] = dataset.cfa
     if depths_mm is not None:
-        pixels[DEPTH_UNIT] = DEPTH_UNIT_M
+        pixels["depth_unit_scale_factor"] = DEPTH_UNIT_M
     document = intrinsics_of(dataset) | pixels | {"frames": frames}
     (folder / TRANSFORMS).write_bytes(json_bytes(document))
 
@@ -155,7 +146,7 @@ def poses_of(dataset: Dataset) -> np.ndarray:
 def true_cameras(dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Places (K, L, 3) in mm and rotations (K, L, 3, 3), whose columns are right, down and forward."""
     grid = dataset.grid
-    if has_errors(dataset):
+    if dataset.has_truth_array("camera_position_mm"):
         named = ("camera_position_mm", "camera_rotation")
         position_mm, rotation = (dataset.truth_array(name).astype(np.float64) for name in named)
         return position_mm, rotation
@@ -163,11 +154,6 @@ def true_cameras(dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
     position_mm[..., 0] = (np.arange(grid.cols) - (grid.cols - 1) / 2) * grid.pitch_mm[0]
     position_mm[..., 1] = ((np.arange(grid.rows) - (grid.rows - 1) / 2) * grid.pitch_mm[1])[:, None]
     return position_mm, np.broadcast_to(np.eye(3), (grid.rows, grid.cols, 3, 3))
-
-
-def has_errors(dataset: Dataset) -> bool:
-    """Whether the cameras are known not to be quite where the grid puts them."""
-    return dataset.has_truth_array("camera_position_mm")
 
 
 def principal_points_px(dataset: Dataset) -> np.ndarray:
@@ -189,7 +175,7 @@ def depths_ahead_mm(dataset: Dataset) -> np.ndarray | None:
     if not dataset.has_truth_array("view_z_mm"):
         return None
     z_mm = dataset.truth_array("view_z_mm")
-    if not has_errors(dataset):
+    if not dataset.has_truth_array("camera_position_mm"):
         return z_mm.astype(np.float32)
     grid = dataset.grid
     position_mm, rotation = true_cameras(dataset)
@@ -217,7 +203,8 @@ def intrinsics_of(dataset: Dataset) -> dict[str, Any]:
     if not any(grid.shear_px):
         members |= {"cx": grid.width / 2, "cy": grid.height / 2}
     members |= {"w": grid.width, "h": grid.height}
-    return members if has_errors(dataset) else members | {OWN_GRID: asdict(grid)}
+    has_errors = dataset.has_truth_array("camera_position_mm")
+    return members if has_errors else members | {"camera_grid": asdict(grid)}
 
 
 def frames_of(dataset: Dataset) -> list[dict[str, Any]]:

@@ -1,13 +1,21 @@
-"""Scenes of the HCI 4D light field benchmark (Honauer et al. 2016): views, cameras and true depth.
+"""The layout of the 4D Light Field Benchmark of Konstanz and Heidelberg (Honauer et al., ACCV 2016).
+
+    input_Cam000.png ...        8-bit RGB of every camera, row by row from the top left
+    parameters.cfg              cameras and range of disparities
+    gt_disp_lowres.pfm          disparity in px of the middle camera, gt_depth_lowres.pfm depth in metres
+    gt_disp_lowres_Cam000.pfm   the same of every camera, and gt_depth_..., if the dataset has view_z_mm
+    README.txt                  what the pixels are
 
 Cameras are parallel and their sensors shifted, so that the disparity between neighbours is 0 at the focus
-distance: d = (f b / p) (1 / z - 1 / z_focus) px, of focal length f, baseline b, and pixels of the side
-p = sensor size / longer side of the image.
+distance F: d = (f b / p) (1 / z - 1 / F) px, of focal length f, baseline b, and pixels of the side
+p = sensor size / longer side of the image. The views of a grid with the shear s have F = f b / (s p).
 """
 
 import configparser
+import io
 import math
-from dataclasses import dataclass
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,31 +23,26 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.exchange.image_folders import Optics, Tell, import_images, listed_names, warn
+from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
+from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
+from pcii.exchange.stated_cameras import Optics, Tell, warn
+from pcii.store.dataset import Dataset
 from pcii.store.folders import read_small
-from pcii.types.images import Views
 from pcii.types.truth import Truth
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"
 DEPTH, DISPARITY = "gt_depth_lowres.pfm", "gt_disp_lowres.pfm"
+README = "README.txt"
 LARGEST_PARAMETERS_BYTES = 1 << 16
 INFINITY_M = 1e9
-"""A focus distance from which on the cameras are not sheared; other tools divide by it."""
+"""Focus distance of a grid without shear. The benchmark's own tools divide by the focus distance and multiply
+with it: infinity or 0 would make NaN of all disparities; this changes none by more than 1e-8 of itself."""
 LEAST_MM = 1e-6
 """Of lengths that divide others."""
 PLAUSIBLE_M = (1e-4, 1e5)
 """Depths beyond are of a map whose byte order is wrong."""
-
-
-@dataclass(frozen=True, eq=False)
-class HciScene:
-    """A scene of the benchmark: its views, the true depth of an odd grid's virtual centre, and its range."""
-
-    views: Views
-    truth: Truth | None
-    z_range_mm: tuple[float, float] | None
 
 
 def import_hci(
@@ -49,7 +52,7 @@ def import_hci(
     cfa: str | None = None,
     report: Report = silent,
     tell: Tell = warn,
-) -> HciScene:
+) -> KnownViews:
     """Views, cameras and true depth of a folder of the HCI 4D light field benchmark.
 
     The folder has parameters.cfg, input_Cam000.png and so on row by row, and maybe gt_depth_lowres.pfm (m)
@@ -59,24 +62,21 @@ def import_hci(
     """
     root = Path(folder)
     known = _Parameters(root / PARAMETERS)
-    rows, cols = known.count("num_cams_y"), known.count("num_cams_x")
-    height, width = known.count("image_resolution_y_px"), known.count("image_resolution_x_px")
+    rows, cols, height, width = (
+        int(known.number(name, 1))
+        for name in ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
+    )
     focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
     pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(width, height)
     focus_m = known.number("focus_distance_m")
-    # A missing end, or nan as exports have it where no depths are known, says nothing.
-    disparities = [
-        math.nan if known.texts.get(name, "nan").lower() == "nan" else known.number(name, -math.inf)
-        for name in ("disp_min", "disp_max")
-    ]
     parallax_px_mm = focal_mm * baseline_mm / pixel_mm
     shear = parallax_px_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
     optics = Optics(
         pitch_mm=(baseline_mm, baseline_mm), focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=(shear, shear)
     )
-    views = import_images(
-        root, PATTERN, optics, grid=(rows, cols), encoding=encoding, cfa=cfa, report=report, tell=_ignore
-    )
+    others: list[str] = []  # files that are no views are named with those of the benchmark
+    options = {"encoding": encoding, "cfa": cfa, "report": report, "tell": others.append}
+    views = import_images(root, PATTERN, optics, grid=(rows, cols), **options)
     if views.grid.shape_HW != (height, width):
         raise InputError(
             f"{root / PARAMETERS}: image_resolution is {height} x {width} px, and the views are "
@@ -87,19 +87,26 @@ def import_hci(
         with np.errstate(divide="ignore"):
             return parallax_px_mm / (np.asarray(disparity_px, np.float64) + shear)
 
-    far, near = (float(depth_mm(np.array(d))) for d in disparities)
-    z_range = (near, far) if 0 < near < far < math.inf else None
-    maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
+    # A missing end, or nan as exports have it where no depths are known, says nothing.
+    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
+    try:
+        far, near = (float(depth_mm(np.array(float(end)))) for end in ends)
+    except ValueError:
+        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
     truth = None
+    maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
     if maps and (rows % 2 == 0 or cols % 2 == 0):
         tell(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
     elif maps:
-        numbers = _map(root / maps[0], (height, width))
+        picture = picture_of(root / maps[0], ["PFM"])
+        if picture.shape[:2] != (height, width):
+            raise InputError(f"{picture.path}: is {picture.layout()}, and the views {height} x {width} px")
+        numbers = next(decode(picture))[..., 0].astype(np.float64)
         z_mm = 1000 * numbers if maps[0] == DEPTH else depth_mm(numbers)
         least, most = (1000 * end for end in PLAUSIBLE_M)
         if not (((z_mm >= least) & (z_mm <= most)) | np.isposinf(z_mm)).all():
             raise InputError(
-                f"{root / maps[0]}: depths are not between {PLAUSIBLE_M[0]:g} and {PLAUSIBLE_M[1]:g} m; the "
+                f"{picture.path}: depths are not between {PLAUSIBLE_M[0]:g} and {PLAUSIBLE_M[1]:g} m; the "
                 "sign of the scale in its header, which tells the byte order, may be wrong"
             )
         truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {})
@@ -108,28 +115,9 @@ def import_hci(
     unused = sorted(files - {PARAMETERS, *maps[:1]})
     if unused:
         tell(f"not used: {listed_names(unused)}")
-    names = [name for name in known.texts if name not in ("disp_min", "disp_max")]
-    if names:
-        tell(f"not used of {PARAMETERS}: {listed_names(names)}")
-    return HciScene(views, truth, z_range)
-
-
-def _ignore(sentence: str) -> None:
-    """Files that are no views are named with those of the benchmark."""
-
-
-def _map(path: Path, shape: tuple[int, int]) -> np.ndarray:
-    """Numbers (H, W) of a map of the middle view; `InputError` for another size, NaN or infinity."""
-    picture = picture_of(path, ["PFM"])
-    if picture.shape[:2] != shape:
-        raise InputError(
-            f"{path}: is {' x '.join(map(str, picture.shape[:2]))} px, where the views are "
-            f"{shape[0]} x {shape[1]}"
-        )
-    numbers = next(decode(picture))[..., 0].astype(np.float64)
-    if np.isnan(numbers).any():
-        raise InputError(f"{path}: holds NaN")
-    return numbers
+    if known.texts:
+        tell(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
+    return KnownViews(views, truth, z_range_mm=(near, far) if 0 < near < far < math.inf else None)
 
 
 class _Parameters:
@@ -146,20 +134,137 @@ class _Parameters:
         self.path = path
         self.texts = {name: text for section in parser.sections() for name, text in parser[section].items()}
 
-    def number(self, name: str, least: float = 0.0, *, is_whole: bool = False) -> float:
+    def number(self, name: str, least: float = 0.0) -> float:
         """A number of at least `least`."""
         text = self.texts.pop(name, "nothing")
         try:
             number = float(text)
         except ValueError:
             number = math.nan
-        if not least <= number < math.inf or (is_whole and number != int(number)):
-            kind = "whole number" if is_whole else "number"
+        if not least <= number < math.inf:
             raise InputError(
-                f"{self.path}: {name}: expected a {kind} of at least {least:g}, got {visible(text)}"
+                f"{self.path}: {name}: expected a number of at least {least:g}, got {visible(text)}"
             )
         return number
 
-    def count(self, name: str) -> int:
-        """A whole number of at least 1."""
-        return int(self.number(name, 1, is_whole=True))
+
+def write_hci(dataset: Dataset, folder: Path) -> None:
+    """Write the images, the parameters, the maps that have a camera to belong to, and a README.
+
+    Raises `InputError` for a grid whose pitch or shear differs between the axes, or whose shear is negative.
+    """
+    grid = dataset.grid
+    baseline_mm = _of_both_axes(dataset, "pitch_mm", grid.pitch_mm)
+    shear_px = _of_both_axes(dataset, "shear_px", grid.shear_px)
+    if shear_px < 0:
+        raise InputError(
+            f"{dataset.path}: shear_px: the HCI layout has a focus distance, and views sheared by "
+            f"{shear_px:g} px have none; export nerfstudio or events"
+        )
+    pictures = pictures_of(dataset)
+    digits = max(3, len(str(grid.view_count - 1)))
+    names = {(k, l): f"Cam{k * grid.cols + l:0{digits}d}" for k, l in np.ndindex(grid.rows, grid.cols)}
+    for (k, l), name in names.items():
+        write_png(folder / f"input_{name}.png", pictures.view(k, l))
+
+    def disparity_px(z_mm: np.ndarray) -> np.ndarray:
+        return baseline_mm * grid.focal_mm / (z_mm.astype(np.float64) * grid.pixel_mm) - shear_px
+
+    for suffix, z_mm in _depth_maps_mm(dataset, names).items():
+        write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
+        write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
+    (folder / PARAMETERS).write_text(_parameters(dataset, baseline_mm, shear_px, disparity_px))
+    (folder / README).write_text(
+        f"{visible(dataset.name)}: {grid.rows} x {grid.cols} integral images, row by row from the top left.\n"
+        f"Pixels are {pictures.meaning}.\nDepth is planar, infinite where nothing is hit; X points right, Y "
+        f"down, Z forward. A focus_distance_m of {INFINITY_M:g} stands for views that are not shifted.\n"
+    )
+
+
+def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> float:
+    """The value that both axes have in common; that of an axis with one camera does not matter."""
+    grid = dataset.grid
+    values = [value for value, cameras in zip(pair, (grid.cols, grid.rows), strict=True) if cameras > 1]
+    if len(values) == 2 and not math.isclose(*values, rel_tol=1e-9):
+        raise InputError(
+            f"{dataset.path}: {name}: the HCI layout has one value for both axes, and this grid has "
+            f"{pair[0]:g} across and {pair[1]:g} down; export nerfstudio or events"
+        )
+    return (values or pair)[0]
+
+
+def _depth_maps_mm(dataset: Dataset, names: dict[tuple[int, int], str]) -> dict[str, np.ndarray]:
+    """Maps of depth (H, W) by the suffix of their files; none of cameras that have errors of calibration."""
+    maps: dict[str, np.ndarray] = {}
+    if dataset.has_truth_array("camera_position_mm"):
+        return maps
+    if dataset.has_truth_array("view_z_mm"):
+        z_mm = dataset.truth_array("view_z_mm")
+        maps = {f"_{name}": z_mm[camera] for camera, name in names.items()}
+    if dataset.truth is not None and dataset.grid.rows % 2 and dataset.grid.cols % 2:
+        maps[""] = dataset.truth.z_mm
+    return maps
+
+
+def _parameters(
+    dataset: Dataset, baseline_mm: float, shear_px: float, disparity_px: Callable[[np.ndarray], np.ndarray]
+) -> str:
+    """The text of parameters.cfg: sections and keys as the benchmark's tools read and write them."""
+    grid, recipe = dataset.grid, dataset.manifest.recipe
+    focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
+    lens = recipe.get("grid", {}).get("lens")
+    lowest, highest = _range_px(dataset, disparity_px)
+    values = {
+        "intrinsics": {
+            "focal_length_mm": grid.focal_mm,
+            "image_resolution_x_px": grid.width,
+            "image_resolution_y_px": grid.height,
+            "sensor_size_mm": grid.pixel_mm * max(grid.width, grid.height),
+            "fstop": grid.focal_mm / lens["aperture_mm"] if lens else math.inf,
+        },
+        "extrinsics": {
+            "num_cams_x": grid.cols,
+            "num_cams_y": grid.rows,
+            "baseline_mm": baseline_mm,
+            "focus_distance_m": focus_m,
+            "center_cam_x_m": 0.0,
+            "center_cam_y_m": 0.0,
+            "center_cam_z_m": 0.0,
+            # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down.
+            "center_cam_rx_rad": math.pi,
+            "center_cam_ry_rad": 0.0,
+            "center_cam_rz_rad": 0.0,
+            "offset": shear_px,
+        },
+        "meta": {
+            "scene": re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name),
+            "category": "additional",
+            "date": "",
+            "version": "",
+            "authors": "",
+            "contact": "",
+            "cycles_seed": recipe.get("seed") or 0,
+            "disp_min": lowest,
+            "disp_max": highest,
+            "frustum_disp_min": lowest,
+            "frustum_disp_max": highest,
+            "depth_map_scale": 1.0,
+        },
+    }
+    parser = configparser.ConfigParser(delimiters="=", interpolation=None)
+    parser.read_dict(values)
+    text = io.StringIO()
+    parser.write(text)
+    return text.getvalue()
+
+
+def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
+    """Least and largest disparity, outwards to a tenth of a pixel: of the truth, else of the recipe's range.
+
+    NaN if nothing is known of the depths.
+    """
+    depths_mm = dataset.analysis.get("z_range_mm") if dataset.truth is None else dataset.truth.z_mm
+    if depths_mm is None:
+        return math.nan, math.nan
+    disparities = disparity_px(np.asarray(depths_mm))
+    return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10

@@ -1,13 +1,13 @@
-"""Elemental images from pictures: a folder with one file a view, or a TIFF file with one page a view.
+"""Elemental images from pictures: a file a view, a TIFF file with a page a view, a picture of a lens array.
 
 A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text.
 """
 
+import itertools
 import math
 import re
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -25,122 +25,22 @@ from pcii.exchange.pixel_files import (
     picture_of,
     radiance_of,
 )
+from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
 from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
+from pcii.types.truth import Truth
 
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
 """Kinds of pictures of views."""
-EXAMPLES = '"{col}_{row}.png", "view{index:03d}.png" or "out_{row}_{col}_*.png"'
 FIELD = re.compile(r"\{(row|col|index)(?::((?:0[1-9])?d?))?\}")
 MOST_VIEWS = 100_000
 MOST_NAMED = 3
 """Largest number of files that a sentence names."""
-Tell = Callable[[str], None]
-"""Takes a sentence on what is left out or assumed."""
-
-
-def warn(sentence: str) -> None:
-    """Pass a sentence on as a Python warning: the default of readers."""
-    warnings.warn(sentence, stacklevel=3)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Optics:
-    """Where cameras stand and how they see: all of a `CameraGrid` that pictures do not say.
-
-    `pitch_mm` (x, y) is between neighbouring cameras, `focal_mm` from pinhole to film. The side of a pixel is
-    `pixel_mm`, or follows from the width of the sensor, `sensor_mm`, and that of the pictures. `shear_px` is
-    that of `CameraGrid`. Raises `InputError` unless exactly one of `pixel_mm` and `sensor_mm` is there.
-    """
-
-    pitch_mm: tuple[float, float]
-    focal_mm: float
-    pixel_mm: float | None = None
-    sensor_mm: float | None = None
-    shear_px: tuple[float, float] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if (self.pixel_mm is None) == (self.sensor_mm is None):
-            raise InputError(
-                "pixel_mm, sensor_mm: give either the side of a pixel or the width of the sensor"
-            )
-        self.grid((1, 1, 1, 1))  # lengths are checked before pictures are read
-
-    def pixel_of(self, width: int) -> float:
-        """Side of a pixel in mm of pictures that are `width` px wide."""
-        if self.pixel_mm is not None:
-            return self.pixel_mm
-        side = self.sensor_mm
-        if isinstance(side, bool) or not isinstance(side, int | float) or not 0 < side < np.inf:
-            raise InputError(f"sensor_mm: expected a finite length above 0 mm, got {side!r}")
-        return side / width
-
-    def grid(self, shape: tuple[int, ...]) -> CameraGrid:
-        """The camera grid of views of the shape (K, L, H, W, ...); raises `InputError` for a wrong length."""
-        rows, cols, height, width = shape[:4]
-        return CameraGrid(
-            rows=rows,
-            cols=cols,
-            pitch_mm=self.pitch_mm,
-            focal_mm=self.focal_mm,
-            pixel_mm=self.pixel_of(width),
-            height=height,
-            width=width,
-            shear_px=self.shear_px,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class ViewOrder:
-    """How the views were stored, if not rows from the top and in each row columns from the left.
-
-    The changes are made in the order in which they stand here.
-    """
-
-    serpentine: bool = False
-    """Every other row is stored backwards, as a stage takes them that moves to and fro."""
-    swap_axes: bool = False
-    """Rows and columns are exchanged; {index} and pages count down the columns."""
-    flip_rows: bool = False
-    """Rows are counted from the bottom."""
-    flip_cols: bool = False
-    """Columns are counted from the right."""
-
-    def arrange(self, views: np.ndarray) -> np.ndarray:
-        """An array (A, B, ...) of views as they were stored, by camera: (K, L, ...).
-
-        >>> ViewOrder(swap_axes=True, flip_rows=True).arrange(np.array([[1, 2, 3], [4, 5, 6]])).tolist()
-        [[3, 6], [2, 5], [1, 4]]
-        >>> ViewOrder(serpentine=True).arrange(np.array([[1, 2, 3], [4, 5, 6]])).tolist()
-        [[1, 2, 3], [6, 5, 4]]
-        """
-        if self.serpentine:
-            views = np.copy(views)
-            views[1::2] = views[1::2, ::-1]
-        if self.swap_axes:
-            views = views.swapaxes(0, 1)
-        return views[:: -1 if self.flip_rows else 1, :: -1 if self.flip_cols else 1]
-
-    def table_of(self, source: str | Path, count: int, grid: tuple[int, int] | None) -> tuple[int, int]:
-        """The table (A, B) in which `count` views of a `grid` (K, L) are stored; square without a grid.
-
-        Raises `InputError`, naming the source, if the count is another one.
-        """
-        rows, cols = grid or (math.isqrt(count), math.isqrt(count))
-        if grid is None and rows * cols != count:
-            raise InputError(f"{source}: {count} views are no square grid; say how many with --grid")
-        if rows * cols != count:
-            raise InputError(f"{source}: has {count} views, where --grid is of {rows} x {cols}")
-        return (cols, rows) if self.swap_axes else (rows, cols)
-
-
-AS_STORED = ViewOrder()
-"""Rows from the top, columns from the left."""
 
 
 def is_picture(path: Path) -> bool:
-    """Whether this is a file that begins like a picture of views."""
+    """Whether a file begins like a picture of views."""
     return path.is_file() and kind_of(path) in VIEWS
 
 
@@ -168,34 +68,59 @@ def import_images(
     check_encoding(encoding)
     path = Path(source)
     if pattern is None:
-        first, shape, pages = pages_of(path, grid, order)
-        views = ((camera, first, pixels) for camera, pixels in pages)
+        picture, pages = pages_of(path, grid, order, tell)
+        shape = pages.shape[:2]
+        views = ((camera, picture, pages[camera]) for camera in np.ndindex(shape))
     else:
-        pictures = headers_of(order.arrange(files_by_camera(path, pattern, grid, order, tell)), tell=tell)
-        first, shape = pictures[0, 0], pictures.shape
-        views = ((camera, picture, next(decode(picture))) for camera, picture in np.ndenumerate(pictures))
-    check_size(path, (*shape, *first.shape))
-    radiance = np.empty((*shape, *first.shape), np.float32)
+        files = order.arrange(files_by_camera(path, pattern, grid, order, tell))
+        shape = files.shape
+        views = ((camera, picture, next(decode(picture))) for camera, picture in pictures_of(files, tell))
+    return views_of(radiance_of_views(path, shape, views, encoding, report), optics, cfa)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownViews:
+    """Views of which their files say more: depths of the virtual centre, of each view, and their range."""
+
+    views: Views
+    truth: Truth | None = None
+    view_z_mm: np.ndarray | None = None
+    """Planar depth of every view (K, L, H, W) float32, +inf where nothing is hit."""
+    z_range_mm: tuple[float, float] | None = None
+
+
+def radiance_of_views(
+    path: Path,
+    shape: tuple[int, ...],
+    views: Iterable[tuple[tuple[int, ...], Picture, np.ndarray]],
+    encoding: Encoding | None,
+    report: Report,
+) -> np.ndarray:
+    """Radiance (K, L, H, W, C) of pixels by camera (k, l); `path` is named if all need too much memory."""
+    radiance = np.empty(0)
     for done, (camera, picture, pixels) in enumerate(views, start=1):
+        if done == 1:
+            check_size(path, (*shape, *picture.shape))
+            radiance = np.empty((*shape, *picture.shape), np.float32)
         radiance[camera] = radiance_of(picture, pixels, encoding)
         report("pictures", done, math.prod(shape))
-    return views_of(radiance, optics.grid(radiance.shape), cfa)
+    return radiance
 
 
-def views_of(radiance: np.ndarray, grid: CameraGrid, cfa: str | None) -> Views:
+def views_of(radiance: np.ndarray, cameras: Optics | CameraGrid, cfa: str | None) -> Views:
     """Views as a sensor with the Bayer pattern `cfa` records them.
 
     Of RGB each pixel keeps the colour of its filter; radiance of one channel is taken for mosaics.
     """
     if cfa is not None and radiance.shape[4] == 3:
         radiance = mosaic(radiance, cfa)[..., None]
-    return Views(radiance, grid, cfa)
+    return Views(radiance, cameras.grid(radiance.shape) if isinstance(cameras, Optics) else cameras, cfa)
 
 
 def pages_of(
-    path: Path, grid: tuple[int, int] | None, order: ViewOrder
-) -> tuple[Picture, tuple[int, int], Iterator[tuple[tuple[int, int], np.ndarray]]]:
-    """Header of a file that has a page for each view, its grid (K, L), and pixels (H, W, C) by camera (k, l).
+    path: Path, grid: tuple[int, int] | None, order: ViewOrder, tell: Tell
+) -> tuple[Picture, np.ndarray]:
+    """A picture that has a page for each view, and the pixels (K, L, H, W, C) of its pages.
 
     Pages are counted along the rows of `grid`, by default a square one. Raises `InputError` for another
     number of pages.
@@ -206,31 +131,35 @@ def pages_of(
             f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
             "folder and --pattern"
         )
+    _tell_unused([(path, picture.unused)], tell)
+    pixels = np.stack([*decode(picture)])
     table = order.table_of(path, picture.pages, grid)
-    numbers = order.arrange(np.arange(picture.pages).reshape(table))
-    K, L = numbers.shape
-    cameras = (divmod(int(number), L) for number in np.argsort(numbers, axis=None))
-    return picture, (K, L), zip(cameras, decode(picture), strict=True)
+    return picture, order.arrange(pixels.reshape(*table, *pixels.shape[1:]))
 
 
-def headers_of(files: np.ndarray, *, pages: bool = False, tell: Tell = warn) -> np.ndarray:
-    """Headers (K, L), object, of pictures of one size, type and number of pages; `InputError` if one differs.
+def pictures_of(files: np.ndarray, tell: Tell) -> Iterator[tuple[tuple[int, ...], Picture]]:
+    """Pictures of one size and type, by camera (k, l), of files (K, L); `InputError` if one differs.
 
-    Pictures of several pages are refused unless `pages`.
+    `tell` takes what else is in them.
     """
-    pictures = np.empty(files.shape, dtype=object)
+    first, others = None, []
     for camera, path in np.ndenumerate(files):
         picture = picture_of(path, VIEWS)
-        if picture.pages > 1 and not pages:
+        if picture.pages > 1:
             raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
-        first = pictures.flat[0] or picture
-        if picture.layout() != first.layout():
-            raise InputError(f"{path}: {picture.layout()}, where {first.path.name} has {first.layout()}")
-        pictures[camera] = picture
-    unused = [picture for picture in pictures.flat if picture.unused]
-    if unused:
-        tell(f"not used: {unused[0].unused} in {unused[0].path.name}{_more(len(unused) - 1)}")
-    return pictures
+        first = first or (path.name, picture.layout())
+        if picture.layout() != first[1]:
+            raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
+        others.append((path, picture.unused))
+        yield camera, picture
+    _tell_unused(others, tell)
+
+
+def _tell_unused(contents: Sequence[tuple[Path, str]], tell: Tell) -> None:
+    """Name what is not used of the content of files."""
+    names = [f"{content} in {path.name}" for path, content in contents if content]
+    if names:
+        tell(f"not used: {names[0]}{_more(len(names) - 1)}")
 
 
 def check_size(path: Path, shape: Sequence[int]) -> None:
@@ -275,18 +204,12 @@ def files_by_camera(
         tell(f"not used: {listed_names(others)}, since --pattern does not fit")
     numbers = np.array([*files])
     first, last = numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist()
-    if min(last) < 0:
-        raise InputError(
-            f"{folder}: all numbers are below 0; write the hyphen into --pattern, as in -{{row}}"
-        )
     size = tuple(end - begin + 1 for begin, end in zip(first, last, strict=True))
     if math.prod(size) > MOST_VIEWS:
-        raise InputError(
-            f"{folder}: the numbers in the files' names are of {' x '.join(map(str, size))} views"
-        )
+        raise InputError(f"{folder}: numbers from {first} to {last} are too far apart for a grid of views")
     if len(names) == 1:
-        count = size[0] if grid is None else max(size[0], math.prod(grid))
-        table = order.table_of(folder, count, grid)
+        size = (max(size[0], math.prod(grid or ())),)
+        table = order.table_of(folder, size[0], grid)
     else:
         table = size[0], size[1]
         stored = grid[::-1] if grid is not None and order.swap_axes else grid
@@ -294,12 +217,15 @@ def files_by_camera(
             raise InputError(
                 f"{folder}: {pattern} gives {table[0]} rows and {table[1]} columns, not those of --grid"
             )
-    views = [tuple(a + b for a, b in zip(first, step, strict=True)) for step in _steps(table, len(names))]
-    missing = [_file_name(pattern, names, view) for view in views if view not in files]
-    if missing:
-        raise InputError(f"{folder}: missing of {table[0]} x {table[1]} views: {listed_names(missing)}")
-    paths = np.empty(len(views), dtype=object)
-    paths[:] = [files[view] for view in views]
+    count = math.prod(table) - len(files)
+    if count:
+        views = (tuple(a + b for a, b in zip(first, step, strict=True)) for step in np.ndindex(*size))
+        missing = itertools.islice((view for view in views if view not in files), MOST_NAMED)
+        some = [_file_name(pattern, names, view) for view in missing]
+        listed = f"{visible(', '.join(some))}{_more(count - len(some))}"
+        raise InputError(f"{folder}: missing of {table[0]} x {table[1]} views: {listed}")
+    paths = np.empty(len(files), dtype=object)
+    paths[:] = [files[view] for view in sorted(files)]
     return paths.reshape(table)
 
 
@@ -316,10 +242,6 @@ def _more(count: int) -> str:
     return f" and {count} more" if count > 0 else ""
 
 
-def _steps(table: tuple[int, int], axes: int) -> list[tuple[int, ...]]:
-    return [(number,) for number in range(math.prod(table))] if axes == 1 else [*np.ndindex(*table)]
-
-
 def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
     """The regular expression of file names, and the names of its numbers: row and col, or index."""
     names = tuple(sorted((match[1] for match in FIELD.finditer(str(pattern))), reverse=True))
@@ -327,7 +249,8 @@ def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
     strange = not steps or str(pattern).startswith("/") or ".." in steps or "\0" in str(pattern)
     if strange or names not in (("index",), ("row", "col")) or {*FIELD.sub("", pattern)} & {*"{}"}:
         raise InputError(
-            f"pattern: expected {{row}} and {{col}}, or {{index}}, as in {EXAMPLES}; got {pattern!r}"
+            f'pattern: expected {{row}} and {{col}}, or {{index}}, as in "{{col}}_{{row}}.png" or '
+            f'"view{{index:03d}}_*.png"; got {pattern!r}'
         )
     parts = re.split(r"(\{[^{}]*\}|\*)", pattern)
     for number, part in enumerate(parts):
@@ -341,3 +264,91 @@ def _file_name(pattern: str, names: Sequence[str], view: Sequence[int]) -> str:
     """The name that a file of a view would have."""
     numbers = dict(zip(names, view, strict=True))
     return FIELD.sub(lambda field: format(numbers[field[1]], field[2] or ""), pattern)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LensArray:
+    """Where the images of `rows` x `cols` lenses are in a picture.
+
+    They repeat every `pitch_px` (x, y), which need not be whole; `offset_px` (x, y) is the left upper corner
+    of the first. `inverted`: each is upside down, as a lens projects it on a sensor, and is turned by 180
+    degrees. Raises `InputError` for no lenses, and for a pitch below 1 px.
+    """
+
+    rows: int
+    cols: int
+    pitch_px: tuple[float, float]
+    offset_px: tuple[float, float] = (0.0, 0.0)
+    inverted: bool = False
+
+    def __post_init__(self) -> None:
+        numbers = (*self.pitch_px, *self.offset_px)
+        if min(self.rows, self.cols, *self.pitch_px) < 1 or not all(map(math.isfinite, numbers)):
+            raise InputError(
+                "rows, cols, pitch_px, offset_px: expected at least one lens, and 1 px from lens to lens, "
+                f"got {self.rows} x {self.cols}, {self.pitch_px} and {self.offset_px}"
+            )
+
+
+def import_lens_array(
+    path: str | Path,
+    lenses: LensArray,
+    optics: Optics,
+    *,
+    order: ViewOrder = AS_STORED,
+    encoding: Encoding | None = None,
+    cfa: str | None = None,
+    tell: Tell = warn,
+) -> Views:
+    """Radiance of the elemental images of a picture of a lens array, cut apart.
+
+    Images are cut around the centre of each lens, floor(pitch) pixels wide and high; where they do not begin
+    at whole pixels they are interpolated, so that no depth is lost to rounding. `optics` are of one lens: its
+    focal length (or gap), the distance between lenses as `pitch_mm`, and pixels of the picture; `sensor_mm`
+    is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
+    `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
+    """
+    check_encoding(encoding)
+    picture = picture_of(Path(path), VIEWS)
+    if picture.pages > 1:
+        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
+    _tell_unused([(Path(path), picture.unused)], tell)
+    height, width, channels = picture.shape
+    optics = replace(optics, pixel_mm=optics.pixel_of(width), sensor_mm=None)
+    across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
+    down = _starts(lenses.rows, lenses.pitch_px[1], lenses.offset_px[1], height, "high", path)
+    size = math.floor(lenses.pitch_px[1]), math.floor(lenses.pitch_px[0])
+    check_size(Path(path), (lenses.rows, lenses.cols, *size, channels))
+    starts_evenly = not (np.concatenate([across, down]) % 2).any()
+    if cfa is not None and channels == 1 and (lenses.inverted or not starts_evenly):
+        raise InputError(
+            f"{path}: is a mosaic, whose pattern lens images break that are turned or do not begin at even "
+            "pixels; give the picture in colours"
+        )
+    whole = radiance_of(picture, next(decode(picture)), encoding)
+    views = _cut(_cut(whole, down, size[0], 0), across, size[1], 2).swapaxes(1, 2)  # (K, h, L, w, C) before
+    if lenses.inverted:
+        views = views[:, :, ::-1, ::-1]
+    return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
+
+
+def _starts(count: int, pitch: float, offset: float, size: int, how: str, path: str | Path) -> np.ndarray:
+    """Where the images of the lenses of an axis begin, (count,), in px."""
+    first = offset + (pitch - math.floor(pitch)) / 2
+    end = first + pitch * (count - 1) + math.floor(pitch)
+    if first < 0 or end > size + 1e-6:
+        raise InputError(
+            f"{path}: {count} lenses of {pitch:g} px from {offset:g} px on reach to {end:g}, and the picture "
+            f"is {size} px {how}"
+        )
+    return first + pitch * np.arange(count)
+
+
+def _cut(picture: np.ndarray, starts: np.ndarray, size: int, axis: int) -> np.ndarray:
+    """Pieces of an axis that begin at `starts`, by linear interpolation: the axis becomes (count, size)."""
+    at = starts[:, None] + np.arange(size)
+    floor = np.minimum(np.floor(at + 1e-9).astype(int), picture.shape[axis] - 1)
+    share = np.clip(at - floor, 0, 1).astype(np.float32)
+    share = share.reshape(*share.shape, *[1] * (picture.ndim - axis - 1))
+    above = np.minimum(floor + 1, picture.shape[axis] - 1)
+    return picture.take(floor, axis) * (1 - share) + picture.take(above, axis) * share

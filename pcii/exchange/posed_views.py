@@ -4,28 +4,21 @@ The frames of a transforms.json may be in any order and the rig anywhere in the 
 those of the pictures.
 """
 
-import itertools
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.exchange.count_arrays import add_frames, frames_of_files, map_array
 from pcii.exchange.export_pictures import DEPTH_UNIT_M, MM_PER_M
-from pcii.exchange.image_folders import Tell, check_size, headers_of, views_of, warn
-from pcii.exchange.photon_cubes import (
-    binary_counts,
-    check_width,
-    frames_of_files,
-    map_array,
-    span_of_frames,
-)
-from pcii.exchange.pixel_files import Encoding, check_encoding, decode, kind_of, picture_of, radiance_of
-from pcii.exchange.transforms_file import MOST_PX, TransformsFile
+from pcii.exchange.image_folders import KnownViews, pictures_of, radiance_of_views, views_of
+from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of
+from pcii.exchange.stated_cameras import Tell, warn
+from pcii.exchange.transforms_file import MOST_PX, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
 
@@ -42,28 +35,8 @@ DIGITS = 9
 """Of lengths that follow from poses: doubles leave more exact, so decimals come back as they were written."""
 USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
-DEPTH_KINDS = ("PNG", "TIFF")
-"""Kinds of pictures of depths: whole numbers of a unit."""
 ROUNDING = 1e-9
 """Of numbers of poses that are equal: metres, or parts of a rotation."""
-
-
-@dataclass(frozen=True, eq=False)
-class PosedViews:
-    """Radiance of the cameras of a transforms.json, and their depths if the file has them."""
-
-    views: Views
-    view_z_mm: np.ndarray | None = None
-    """Planar depth of every view (K, L, H, W) float32, +inf where nothing is hit."""
-
-    @property
-    def truth(self) -> Truth | None:
-        """Depth of the middle view, which is the virtual centre of an odd grid."""
-        grid = self.views.grid
-        if self.view_z_mm is None or grid.rows % 2 == 0 or grid.cols % 2 == 0:
-            return None
-        middle = self.view_z_mm[grid.rows // 2, grid.cols // 2]
-        return Truth(middle, np.zeros(middle.shape, np.int16), {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +55,7 @@ class PoseGrid:
 
 
 def import_posed_pictures(
-    file: TransformsFile,
+    source: str | Path,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -91,7 +64,7 @@ def import_posed_pictures(
     cfa: str | None = None,
     report: Report = silent,
     tell: Tell = warn,
-) -> PosedViews:
+) -> KnownViews:
     """Views, cameras and depths of a transforms.json, whose poses are of one plane grid of parallel cameras.
 
     The file tells the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
@@ -100,28 +73,29 @@ def import_posed_pictures(
     frame or picture, for what is missing, wrong, or no such grid.
     """
     check_encoding(encoding)
+    file = read_transforms(source, tell=tell)
     if file.is_stack:
-        raise InputError(
-            f"{file.path}: file_path: has the pictures of all frames; expected a file_path in each frame"
-        )
+        raise InputError(f"{file.path}: file_path: expected one in each frame; it is of all frames")
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
-    pictures = headers_of(np.array(file.file_paths, object)[poses.numbers], tell=tell)
-    first = pictures[0, 0]
-    if first.shape[:2] != grid.shape_HW:
+    files = np.array(file.file_paths, object)[poses.numbers]
+    views = ((camera, picture, next(decode(picture))) for camera, picture in pictures_of(files, tell))
+    radiance = radiance_of_views(file.path, files.shape, views, encoding, report)
+    if radiance.shape[2:4] != grid.shape_HW:
         raise InputError(
-            f"{first.path}: is {first.shape[0]} x {first.shape[1]} px, where {file.path.name} says "
+            f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "
             f"{grid.height} x {grid.width}, rows x columns"
         )
-    radiance = np.empty((*pictures.shape, *first.shape), np.float32)
-    for done, (camera, picture) in enumerate(np.ndenumerate(pictures), start=1):
-        radiance[camera] = radiance_of(picture, next(decode(picture)), encoding)
-        report("pictures", done, pictures.size)
-    return PosedViews(views_of(radiance, grid, cfa), _depths(file, poses, tell))
+    view_z_mm = _depths(file, poses, tell)
+    truth = None
+    if view_z_mm is not None and grid.rows % 2 and grid.cols % 2:  # the middle view is the virtual centre
+        middle = view_z_mm[grid.rows // 2, grid.cols // 2]
+        truth = Truth(middle, np.zeros(middle.shape, np.int16), {})
+    return KnownViews(views_of(radiance, grid, cfa), truth, view_z_mm)
 
 
 def import_cubes(
-    file: TransformsFile,
+    source: str | Path,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -138,36 +112,35 @@ def import_cubes(
     first and the last to add up; `cfa` is the Bayer pattern where the file says none. Raises `InputError`,
     naming file and member, for cameras that are no grid, and cubes that do not fit what the file says.
     """
+    file = read_transforms(source, tell=tell)
     document = file.document
     if document.bitpack_dim != 2 or document.c not in (None, 1):
         raise InputError(
             f"{file.path}: bitpack_dim, c: expected 2 and 1: one channel, packed along the width"
         )
-    if document.cfa not in (None, "none", cfa) and cfa is not None:
-        raise InputError(f"{file.path}: cfa: is {document.cfa}; leave out --cfa")
+    pattern = None if document.cfa == "none" else document.cfa
+    if pattern is not None and cfa not in (None, pattern):
+        raise InputError(f"{file.path}: cfa: is {pattern}; leave out --cfa")
     cameras = file
     if file.is_stack:
         if np.ptp(file.poses, axis=0).max() + np.ptp(file.centres_px, axis=0).max() > ROUNDING:
-            raise InputError(
-                f"{file.path}: frames: the camera moves from frame to frame, and a moving camera is no grid "
-                "of cameras"
-            )
+            raise InputError(f"{file.path}: frames: the camera moves, and a moving camera is no grid")
         cameras = replace(file, poses=file.poses[:1], centres_px=file.centres_px[:1])
     poses = find_grid(cameras)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
-    stacks = frames_of_files(np.array(file.file_paths, object)[poses.numbers], packed=True)
-    first = stacks[0, 0]
-    if first.height != grid.height:
-        raise InputError(
-            f"{first.name}: is {first.height} px high, where {file.path.name} says {grid.height}"
-        )
-    check_width(first, grid.width, file.path.name)
+    stacks = frames_of_files(np.array(file.file_paths, object)[poses.numbers])
+    first = stacks[0, 0].load()
     for number in (document.num_frames, len(file.poses) if file.is_stack else None):
-        if number not in (None, first.frames):
-            raise InputError(f"{file.path}: frames: says {number}, and {first.name} has {first.frames}")
-    span = span_of_frames(frames, first.frames, first.name)
-    pattern = cfa if document.cfa in (None, "none") else document.cfa
-    return binary_counts(stacks, grid, span, cfa=pattern, report=report, tell=tell)
+        if number not in (None, len(first)):
+            raise InputError(f"{file.path}: frames: says {number}, and {stacks[0, 0].name} has {len(first)}")
+
+    def stated_grid(shape: tuple[int, ...]) -> CameraGrid:
+        if shape != grid.shape_KLHW:
+            raise InputError(f"{stacks[0, 0].name}: is {shape[2]} px high, and h is {grid.height}")
+        return grid
+
+    options = {"frames": frames, "cfa": pattern or cfa, "report": report, "tell": tell}
+    return add_frames(stacks, stated_grid, bitpack=True, width=grid.width, **options)
 
 
 def camera_grid_of(
@@ -190,18 +163,6 @@ def camera_grid_of(
     else:
         pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
         focal_mm = _digits(file.focal_px * pixel_mm)
-    rows, cols = poses.numbers.shape
-    check_size(file.path, (rows, cols, file.height, file.width))
-    grid = CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=poses.pitch_mm,
-        focal_mm=focal_mm,
-        pixel_mm=pixel_mm,
-        height=file.height,
-        width=file.width,
-        shear_px=poses.shear_px,
-    )
     if not lengths:
         tell(
             f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
@@ -213,7 +174,17 @@ def camera_grid_of(
             f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
             "below it, alike in all: sections and depth are in the frame of the pictures"
         )
-    return grid
+    rows, cols = poses.numbers.shape
+    return CameraGrid(
+        rows=rows,
+        cols=cols,
+        pitch_mm=poses.pitch_mm,
+        focal_mm=focal_mm,
+        pixel_mm=pixel_mm,
+        height=file.height,
+        width=file.width,
+        shear_px=poses.shear_px,
+    )
 
 
 def find_grid(file: TransformsFile) -> PoseGrid:
@@ -226,7 +197,12 @@ def find_grid(file: TransformsFile) -> PoseGrid:
     if count > MOST_CAMERAS:
         raise InputError(f"{file.path}: frames: {count} cameras, and a grid has at most {MOST_CAMERAS}")
     place_mm = _places_in_common_frame(file)
-    (x0, step_x, cols, col_of), (y0, step_y, rows, row_of) = _lattices(file, place_mm)
+    apart = _nearest_mm(place_mm) / 4
+    if apart == 0:
+        raise InputError(f"{file.path}: frames: most cameras are at the same place as another one")
+    (x0, step_x, cols, col_of), (y0, step_y, rows, row_of) = (
+        _lattice_of(places, apart) for places in place_mm[:2]
+    )
     pitch = step_x or step_y or 1.0, step_y or step_x or 1.0
     off_mm = np.stack([place_mm[0] - x0 - step_x * col_of, place_mm[1] - y0 - step_y * row_of, place_mm[2]])
     side_px = max(file.width, file.height)
@@ -242,15 +218,15 @@ def find_grid(file: TransformsFile) -> PoseGrid:
             "allowed"
         )
     numbers = np.full((rows, cols), -1)
-    for number, camera in enumerate(zip(row_of.tolist(), col_of.tolist(), strict=True)):
-        if numbers[camera] >= 0:
-            first, second = file.frame_name(int(numbers[camera])), file.frame_name(number)
-            raise InputError(f"{file.path}: {first} and {second} are at the same place of the grid")
-        numbers[camera] = number
-    lacking = [(int(k), int(l)) for k, l in itertools.islice(np.argwhere(numbers < 0), 1)]
-    if lacking:
+    numbers[row_of, col_of] = np.arange(count)
+    twice = np.flatnonzero(numbers[row_of, col_of] != np.arange(count))
+    if twice.size:
+        names = (file.frame_name(int(n)) for n in (twice[0], numbers[row_of, col_of][twice[0]]))
+        raise InputError(f"{file.path}: {' and '.join(names)} are at the same place of the grid")
+    if count < numbers.size:
+        k, l = np.argwhere(numbers < 0)[0].tolist()
         raise InputError(
-            f"{file.path}: frames: no camera at {lacking[0]} (row from the top, column from the left) of a "
+            f"{file.path}: frames: no camera at ({k}, {l}) (row from the top, column from the left) of a "
             f"grid of {rows} x {cols}, where {count} have one; every place of the grid needs a picture"
         )
     (shear_x, offset_x), (shear_y, offset_y) = _centres(file, (col_of, row_of), (cols, rows))
@@ -266,7 +242,7 @@ def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
     """Places (3, N) in mm to the right, down and forward in the common orientation of the cameras.
 
     That is the rotation nearest to the median of all matrices, element by element: a few cameras that are
-    turned do not move it, so that the angle told of them is their own.
+    turned do not move it, so that the angle in the message is their own.
     """
     turns = file.poses[:, :3, :3]
     left, _, right = np.linalg.svd(np.median(turns, axis=0))
@@ -289,55 +265,45 @@ def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
     return place_mm
 
 
-_Lattice = tuple[float, float, int, np.ndarray]
-"""Evenly spaced numbers: the first, the step (0 of one), how many, and which of them each value is."""
-
-
-def _lattices(file: TransformsFile, place_mm: np.ndarray) -> tuple[_Lattice, _Lattice]:
-    """The lattices of columns and of rows; `InputError` if most cameras are at the place of another one."""
+def _nearest_mm(place_mm: np.ndarray) -> float:
+    """Median distance from a camera to the nearest other one in the plane; infinite for a single camera."""
     from scipy.spatial import KDTree
 
     if place_mm.shape[1] == 1:
-        apart = math.inf
-    else:
-        nearest_mm, _ = KDTree(place_mm[:2].T).query(place_mm[:2].T, k=2)  # the nearest is the camera itself
-        apart = float(np.median(np.asarray(nearest_mm)[:, 1])) / 4
-    if apart == 0:
-        raise InputError(f"{file.path}: frames: most cameras are at the same place as another one")
-    return _lattice_of(place_mm[0], apart), _lattice_of(place_mm[1], apart)
+        return np.inf
+    distances, _ = KDTree(place_mm[:2].T).query(place_mm[:2].T, k=2)  # the nearest is the camera itself
+    return float(np.median(np.asarray(distances)[:, 1]))
 
 
-def _lattice_of(values: np.ndarray, apart: float) -> _Lattice:
-    """The lattice of values (N,), of which those that are closer than `apart` are of one place.
+def _lattice_of(values: np.ndarray, apart: float) -> tuple[float, float, int, np.ndarray]:
+    """Evenly spaced numbers: the first, the step (0 of one), how many, and which of them each value (N,) is.
 
-    Places with less than half as many values as the fullest one are left out of the fit, so that few values
-    that are wrong move no other.
+    Values closer than `apart` are of one place. Places with less than half as many values as the fullest one
+    are left out of the fit, so that few values that are wrong move no other.
     """
     ordered = np.sort(values)
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
     fullest = max(map(len, groups))
     centres = np.array([np.median(group) for group in groups if 2 * len(group) >= fullest])
-    gaps = np.diff(centres)
-    if not gaps.size:
+    if centres.size == 1:
         return float(centres[0]), 0.0, 1, np.zeros(len(values), np.int64)
+    gaps = np.diff(centres)
     usual = np.quantile(gaps, 0.5, method="lower")
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / usual), 1))])
-    origin, step = line_through(number, centres)
+    origin, step = _line_through(number, centres)
     count = int(number[-1]) + 1
     return origin, step, count, np.clip(np.rint((values - origin) / step), 0, count - 1).astype(np.int64)
 
 
-def line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Value at x = 0 and slope of a line: medians over all pairs of points (Theil 1950, Sen 1968).
 
-    It stays as it is if less than 29 % of the points are wrong. The x, at least two, all differ.
-
-    >>> line_through(np.arange(5.0), np.array([1.0, 3.0, 5.0, 70.0, 9.0]))
-    (1.0, 2.0)
+    It stays as it is if less than 29 % of the points are wrong.
     """
-    first, second = np.triu_indices(len(x), 1)
-    slope = float(np.median((y[second] - y[first]) / (x[second] - x[first])))
-    return float(np.median(y - slope * x)), slope
+    from scipy.stats import theilslopes
+
+    line: Any = theilslopes(y, x, method="joint")
+    return float(line.intercept), float(line.slope)
 
 
 def _centres(
@@ -349,7 +315,7 @@ def _centres(
         from_middle = file.centres_px[:, axis] - side / 2
         typical = np.array([np.median(from_middle[index[axis] == number]) for number in range(counts[axis])])
         steps = np.arange(counts[axis]) - (counts[axis] - 1) / 2
-        offset, shear = line_through(steps, typical) if counts[axis] > 1 else (float(typical[0]), 0.0)
+        offset, shear = _line_through(steps, typical) if counts[axis] > 1 else (float(typical[0]), 0.0)
         off[axis] = from_middle - (offset + shear * steps[index[axis]])
         lines.append(tuple(0.0 if abs(v) < 1e-12 * side else _digits(v) for v in (shear, offset)))
     off_px = np.hypot(*off)
@@ -367,38 +333,26 @@ def _digits(value: float) -> float:
 
 
 def _depths(file: TransformsFile, poses: PoseGrid, tell: Tell) -> np.ndarray | None:
-    """Depth of every view in mm; None, and why is told, if it is not known of all."""
-    if not any(file.depth_paths):
+    """Depth of every view in mm; None, which is told, if it is not known of all."""
+    paths = [path for path in file.depth_paths if path is not None]
+    if not paths:
         return None
-    if not all(file.depth_paths):
-        tell(f"not used: depth_file_path, which {file.frame_name(file.depth_paths.index(None))} lacks")
+    if len(paths) < poses.numbers.size or not {path.suffix for path in paths} <= {".npy", ".png", ".tif"}:
+        tell("not used: depth_file_path; expected a .npy, .png or .tif file of every frame")
         return None
     unit_mm = MM_PER_M * (file.document.depth_unit_scale_factor or DEPTH_UNIT_M)
     depths = np.empty((*poses.numbers.shape, file.height, file.width), np.float32)
-    for camera, path in np.ndenumerate(np.array(file.depth_paths, object)[poses.numbers]):
-        numbers = _depth_numbers(path)
-        if numbers is None:
-            tell(f"not used: depth_file_path, since {path.name} is no .npy, PNG or TIFF of one channel")
-            return None
-        if numbers.shape != depths.shape[2:]:
-            raise InputError(f"{path}: expected {file.height} x {file.width} numbers, got {numbers.shape}")
+    for camera, path in np.ndenumerate(np.array(paths, object)[poses.numbers]):
+        is_array = path.suffix == ".npy"
+        numbers = map_array(path)[..., None] if is_array else next(decode(picture_of(path, ("PNG", "TIFF"))))
+        if numbers.dtype.kind not in "fu" or numbers.shape != (*depths.shape[2:], 1):
+            raise InputError(
+                f"{path}: expected {file.height} x {file.width} numbers, got {numbers.dtype} {numbers.shape}"
+            )
         with np.errstate(over="ignore"):
-            z_mm = numbers.astype(np.float32) * np.float32(unit_mm)
+            z_mm = numbers[..., 0].astype(np.float32) * np.float32(unit_mm)
         if not (z_mm >= 0).all():
             raise InputError(f"{path}: holds NaN or depths below 0")
         depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
     tell(f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit")
     return depths
-
-
-def _depth_numbers(path: Path) -> np.ndarray | None:
-    """Numbers (H, W) of a file of depth; None for a kind of file that has no unit that is agreed on."""
-    if path.suffix == ".npy":
-        numbers = map_array(path)
-        return numbers if numbers.dtype.kind in "fu" else None
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    if kind_of(path) not in DEPTH_KINDS:
-        return None
-    picture = picture_of(path, DEPTH_KINDS)
-    return next(decode(picture))[..., 0] if picture.shape[2] == 1 else None

@@ -18,8 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
-from pcii.exchange.image_folders import VIEWS, Tell, warn
+from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
+from pcii.exchange.stated_cameras import Tell, warn
 from pcii.store.folders import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
@@ -29,7 +30,7 @@ MOST_SKEW = 1e-4
 that is wrong by this share moves a point by 0.1 px; matrices of 6 decimals are 100 times closer."""
 PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 """Values of camera_model that, without distortion, are pinholes."""
-DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye")
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
 """Endings that NeRF's own files leave out of the names of pictures."""
 
@@ -123,15 +124,15 @@ def transforms_in(source: Path) -> Path | None:
 
 
 def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
-    """Read a transforms.json of anybody; a picture is opened only where the file does not say its size.
+    """Read a transforms.json of anybody, or that of a folder.
 
-    Intrinsics of a frame win over those at the top; without `fl_x` an angle of view tells the focal length.
-    Places are divided by `applied_scale`. `tell` takes the names of members that are not used. Raises
-    `InputError`, naming file and member, for what is missing or wrong, pixels that are not square, lenses
-    that distort, frames of different size or focal length, matrices that are no poses, and paths that are
-    used twice or lead out of the folder.
+    A picture is opened only where the file does not say its size. Intrinsics of a frame win over those at the
+    top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `tell`
+    takes the names of members that are not used. Raises `InputError`, naming file and member, for what is
+    missing or wrong, pixels that are not square, lenses that distort, frames of different size or focal
+    length, matrices that are no poses, and paths that are used twice or lead out of the folder.
     """
-    file = Path(path)
+    file = transforms_in(Path(path)) or Path(path)
     document = _parsed(file)
     frames = document.frames
     if document.file_path is None:
@@ -139,15 +140,12 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     else:
         paths = [_path(file, "file_path", document.file_path)]
     depths = [
-        None if frame.depth_file_path is None else _path(file, f"frames.{n}.depth_file_path", name)
+        _path(file, f"frames.{n}.depth_file_path", frame.depth_file_path) if frame.depth_file_path else None
         for n, frame in enumerate(frames)
-        for name in (frame.depth_file_path,)
     ]
-    for name, listed in (("file_path", paths), ("depth_file_path", depths)):
-        first: dict[Path, int] = {}
-        for number, one in enumerate(listed):
-            if one is not None and first.setdefault(one, number) != number:
-                raise InputError(f"{file}: frames.{number}.{name}: is that of frames.{first[one]} too")
+    if len({*paths}) < len(paths):
+        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
+        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
     if None in (document.w or frames[0].w, document.h or frames[0].h):
         if paths[0].suffix == ".npy":
             raise InputError(f"{file}: w, h: missing; the size of the pictures in pixels")
@@ -205,40 +203,33 @@ def _path(file: Path, member: str, text: str | None) -> Path:
 
 def _lens(file: Path, place: str, top: _Lens, frame: _Lens) -> tuple[int, int, float, tuple[float, float]]:
     """Width, height, focal length and principal point (x, y) of a frame, in px."""
-    own = frame.model_fields_set
-
-    def value(name: str) -> Any:
-        return getattr(frame if name in own and getattr(frame, name) is not None else top, name)
-
-    distortion = [value(name) for name in DISTORTIONS] + (value("distortion_params") or [])
-    if any(distortion) or value("is_fisheye"):
+    stated = top.model_dump(include={*_Lens.model_fields}) | frame.model_dump(
+        include={*_Lens.model_fields}, exclude_unset=True, exclude_none=True
+    )
+    if any(stated[name] for name in DISTORTIONS) or any(stated["distortion_params"] or ()):
         raise InputError(f"{file}: {place}: the lens distorts (k1, is_fisheye ...); undistort the pictures")
-    if value("camera_model") not in (None, *PINHOLES):
+    if stated["camera_model"] not in (None, *PINHOLES):
         raise InputError(
             f"{file}: camera_model: expected one of {', '.join(PINHOLES)}; pictures of other lenses are "
             "undistorted first"
         )
-    width, height = value("w"), value("h")
-    focal = {
-        f"fl_{axis}": value(f"fl_{axis}") or _focal_px(value(f"camera_angle_{axis}"), size)
-        for axis, size in (("x", width), ("y", height))
-    }
-    across, down = focal["fl_x"] or focal["fl_y"], focal["fl_y"] or focal["fl_x"]
-    if across is None or down is None:
+    focal_px: list[float] = []
+    for axis, size in (("x", stated["w"]), ("y", stated["h"])):
+        angle = stated[f"camera_angle_{axis}"]
+        if stated[f"fl_{axis}"] or angle:
+            focal_px.append(stated[f"fl_{axis}"] or size / 2 / math.tan(angle / 2))
+    if not focal_px:
         raise InputError(f"{file}: fl_x: missing; the focal length in pixels, or camera_angle_x")
+    across, down = focal_px[0], focal_px[-1]
+    width, height = stated["w"], stated["h"]
     if abs(across - down) * max(width, height) / 2 > MOST_PX * across:
         raise InputError(
             f"{file}: fl_y: is {down:g} where fl_x is {across:g}; pixels that are not square are resampled"
         )
     x, y = (
-        size / 2 if value(name) is None else value(name) for name, size in (("cx", width), ("cy", height))
+        size / 2 if stated[name] is None else stated[name] for name, size in (("cx", width), ("cy", height))
     )
     return width, height, across, (x, y)
-
-
-def _focal_px(angle: float | None, size: int) -> float | None:
-    """Focal length in px of an angle of view in radians."""
-    return None if angle is None else size / 2 / math.tan(angle / 2)
 
 
 def _pose(file: Path, number: int, rows: Iterable[list[float]]) -> np.ndarray:

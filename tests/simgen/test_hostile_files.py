@@ -72,7 +72,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "XML": ("scene.xml", b"<scene version='3.0.0'/>", "not named .ply or .obj"),
     "bomb": ("a.png", png(width=60_000, height=60_000, data=BOMB), "exceeds limit"),
     "text bomb": ("a.png", png(extra=chunk(b"zTXt", b"a\0\0" + BOMB)), "too large"),
-    "truncated": ("a.png", png()[:-30], "its header cannot be read"),
+    "truncated": ("a.png", png()[:-30], "damaged or cut off"),
     "checksum": ("a.png", png()[:-20] + b"\0\0\0\0" + png()[-16:], "damaged or cut off"),
     "two pictures": ("a.png", animation(), "holds 2 pictures"),
     "clear": ("a.png", picture("RGBA", "PNG"), "not opaque everywhere"),

@@ -16,17 +16,14 @@ from pcii import (
     LensArray,
     Optics,
     ViewOrder,
-    Views,
     check_grid,
     import_arrays,
     import_counts,
     import_hci,
     import_images,
     import_lens_array,
-    limit_photons,
     reconstruct,
 )
-from pcii.types.bayer import mosaic
 from pcii.types.geometry import disparity_px
 
 PARAMETERS = """[intrinsics]
@@ -221,25 +218,6 @@ def test_frames_are_not_averaged_over_their_faults() -> None:
     frames[0, 0, 0, 0, 0], frames[0, 0, 1, 0, 0] = 0.5, 0.5
     with pytest.raises(ValueError, match="whole numbers"):
         import_counts(frames, OPTICS)
-
-
-def test_photon_limiting_keeps_the_budget_the_shape_and_the_seed() -> None:
-    grid = OPTICS.grid((2, 2, 40, 60))
-    light = np.random.default_rng(0).random((*grid.shape_KLHW, 3)).astype(np.float32)
-    views = Views(light, grid)
-    counts = limit_photons(views, 20_000, seed=3, cfa="GRBG")
-    assert counts.cfa == "GRBG"
-    raw = mosaic(light[1, 0].astype(np.float64), "GRBG")
-    rates = 20_000 * raw / raw.sum()
-    seen = counts.view(1, 0)
-    assert abs(seen.sum() - 20_000) < 4 * np.sqrt(20_000)
-    chi = ((seen - rates) ** 2 / rates).sum()  # of 2400 pixels, deviation sqrt(2 * 2400) or a little more
-    assert abs(chi - raw.size) < 5 * np.sqrt(2.2 * raw.size)
-    again = limit_photons(Views(mosaic(light, "GRBG")[..., None], grid, "GRBG"), 20_000, seed=3)
-    np.testing.assert_array_equal(again.view(1, 0), seen)
-    assert not np.array_equal(limit_photons(views, 20_000, seed=4, cfa="GRBG").view(1, 0), seen)
-    dark = limit_photons(Views(0 * light, grid), 100, seed=1)
-    assert dark.total == 0
 
 
 def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:

@@ -1,14 +1,11 @@
 """Photon cubes are what NumPy and other people's programs read, and take the room of their photons alone."""
 
 import json
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from photon_cubes import FRAMES, bits_of, packed, write_cubes
-from PIL import Image
 from stored_datasets import one_sentence
 
 import pcii
@@ -98,18 +95,3 @@ def test_visionsim_reads_the_frames(tmp_path: Path) -> None:
         assert data.full_shape == (FRAMES, 11, 13, 1)
         frames = np.stack([np.asarray(data[t][1]).reshape(11, 13) for t in range(len(data))])
         np.testing.assert_array_equal(frames, bits[k, l])
-
-
-@pytest.mark.skipif(shutil.which("photoncube") is None, reason="needs the photoncube command line")
-def test_the_photoncube_program_sees_the_mean_of_the_frames(tmp_path: Path) -> None:
-    grid = pcii.CameraGrid(rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=16, width=24)
-    bits = bits_of(grid, share=0.4)
-    out = write_cubes(tmp_path, bits, grid)
-    pictures = tmp_path / "pictures"
-    pictures.mkdir()
-    command = ["photoncube", "preview", "-i", str(out / "00_01" / "frames.npy"), "-d", str(pictures)]
-    subprocess.run([*command, "--burst-size", str(FRAMES)], check=True, capture_output=True)
-    (path,) = pictures.glob("*.png")
-    picture = np.array(Image.open(path))
-    grey = picture if picture.ndim == 2 else picture[..., 0]
-    np.testing.assert_allclose(grey / 255, bits[0, 1].mean(axis=0), atol=1.001 / 255)

@@ -100,11 +100,6 @@ def test_a_collection_is_exported_as_a_whole_or_not_at_all(collection, tmp_path)
     assert "no finished dataset" in message
 
 
-def test_an_unknown_format_is_refused(tmp_path):
-    with pytest.raises(pcii.InputError, match="format: there is no 'tiff'"):
-        pcii.export_dataset(make_dataset(tmp_path / "data"), "tiff", tmp_path / "out")  # type: ignore[arg-type]
-
-
 def test_a_full_disk_leaves_nothing_behind(tmp_path, monkeypatch):
     data = make_dataset(tmp_path / "data")
 

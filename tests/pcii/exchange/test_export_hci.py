@@ -1,7 +1,6 @@
 """The HCI layout, read by what the benchmark publishes of it: names, keys, formulas, PFM."""
 
 import configparser
-import math
 from pathlib import Path
 
 import numpy as np
@@ -119,14 +118,6 @@ def test_the_published_formulas_hold_for_maps_and_parameters(tmp_path, shear):
         assert hci.focus_m == INFINITY_M
 
 
-def test_what_hits_nothing_is_infinitely_far(tmp_path):
-    grid = grid_of(3, 3, shear_px=(3.5, 3.5))
-    hci = exported(write_planes(tmp_path / "planes", grid, below_mm=np.inf))
-    np.testing.assert_array_equal(hci.pfm("gt_depth_lowres.pfm")[-1], np.inf)
-    np.testing.assert_array_equal(hci.pfm("gt_disp_lowres.pfm")[-1], np.float32(-3.5))
-    assert (hci.disp_min, hci.disp_max) == (-3.5, 1.0)
-
-
 def test_cameras_have_their_own_maps_and_an_even_grid_has_none_of_its_centre(tmp_path):
     grid = grid_of(2, 3)
     hci = exported(write_planes(tmp_path / "planes", grid, view_truth=True))
@@ -136,17 +127,6 @@ def test_cameras_have_their_own_maps_and_an_even_grid_has_none_of_its_centre(tmp
         disparity = hci.pfm(f"gt_disp_lowres_Cam{3 * k + l:03d}.pfm")
         np.testing.assert_allclose(hci.disparity_px(depth), disparity, atol=1e-5)
     assert not (hci.folder / "gt_depth_lowres.pfm").exists()
-    assert "between cameras" in hci.readme
-
-
-def test_without_truth_no_disparities_are_known(tmp_path):
-    views = pcii.Views(np.full((2, 3, 16, 24, 3), 0.5, np.float32), grid_of(2, 3, height=16, width=24))
-    pcii.save_dataset(tmp_path / "data", views)
-    hci = exported(tmp_path / "data")
-    assert math.isnan(hci.disp_min)
-    assert math.isnan(hci.disp_max)
-    assert math.isinf(hci.fstop)
-    assert pcii.import_hci(hci.folder).views.grid.shape_KLHW == (2, 3, 16, 24)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,8 @@ import pytest
 import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
-from png_files import compressed, png_file
 
-from pcii import InputError, Optics, ViewOrder, Views, import_images
+from pcii import InputError, Optics, ViewOrder, import_images
 from pcii.base.srgb import srgb_to_linear
 from pcii.exchange.pixel_files import to_radiance
 
@@ -71,34 +70,6 @@ def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: 
     decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
     expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
     np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
-
-
-def test_png_of_few_bits_and_palettes_are_as_bright(tmp_path: Path) -> None:
-    share = np.linspace(0, 1, H * W).reshape(H, W)
-    bits = np.unpackbits(np.rint(share * 15).astype(np.uint8)[..., None], axis=2)[..., 4:]
-    rows = np.packbits(bits.reshape(H, -1), axis=1)
-    four = png_file(W, H, 4, 0, compressed(rows))
-    (tmp_path / "0_0.png").write_bytes(four)
-    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)[..., 0]
-    np.testing.assert_allclose(seen, np.rint(share * 15) / 15, rtol=1e-6)
-    colours = Image.fromarray(numbers(0, 0) // 32 * 32).convert("P", palette=Image.Palette.ADAPTIVE)
-    colours.save(tmp_path / "0_0.png")
-    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)
-    np.testing.assert_allclose(seen, np.asarray(colours.convert("RGB")) / 255, rtol=1e-6)
-
-
-@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
-def test_compressed_tiff(tmp_path: Path, compression: str) -> None:
-    image = numbers(0, 0, np.uint16)
-    write(tmp_path / "0_0.tif", image, compression)
-    views = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear")
-    np.testing.assert_array_equal(np.rint(views.view(0, 0) * 65535), image)
-
-
-def test_jpeg_is_read(tmp_path: Path) -> None:
-    Image.fromarray(np.full((H, W, 3), 188, np.uint8)).save(tmp_path / "0_0.jpg", quality=100)
-    views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
-    np.testing.assert_allclose(views.view(0, 0), by_the_standard(188 / 255), rtol=0.02)
 
 
 def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) -> None:
@@ -169,7 +140,7 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     (tmp_path / "0_0.exr").unlink()
     first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
     first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
-    with pytest.warns(UserWarning, match=r"not used: 1 more pictures in the file in 0_0\.jpg"):
+    with pytest.warns(UserWarning, match=r"not used: 1 more pictures in 0_0\.jpg"):
         views = import_images(tmp_path, PATTERN % "jpg", OPTICS, tell=warnings.warn)
     np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
     spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
@@ -206,11 +177,3 @@ def test_optics_take_a_sensor_or_a_pixel() -> None:
     for sizes in wrong:
         with pytest.raises(InputError, match="_mm: "):
             Optics(**lengths, **sizes)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_views_do_not_take_numbers_of_pictures_for_light(dtype) -> None:
-    grid = OPTICS.grid((1, 2, H, W))
-    with pytest.raises(InputError, match="is sRGB, not light"):
-        Views(np.ones((1, 2, H, W, 3), dtype), grid)
-    Views(srgb_to_linear(np.ones((1, 2, H, W, 3), dtype)), grid)

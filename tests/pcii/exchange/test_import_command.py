@@ -97,17 +97,6 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
 
 
-@pytest.mark.parametrize("options", [[], ["--swap-axes"]])
-def test_pages_of_photon_counts_are_views(tmp_path: Path, options: list[str]) -> None:
-    counts = np.random.default_rng(1).poisson(2, (2, 3, H, W)).astype(np.uint16)
-    stored = counts.swapaxes(0, 1) if options else counts  # down the columns
-    tifffile.imwrite(tmp_path / "in.tif", stored.reshape(6, H, W), photometric="minisblack")
-    told = ["--counts", "--grid", 2, 3, *CAMERAS, *options]
-    assert run("import", tmp_path / "in.tif", "-o", tmp_path / "out", *told) == 0
-    seen = open_dataset(tmp_path / "out").counts
-    np.testing.assert_array_equal([[seen.view(k, l) for l in range(3)] for k in range(2)], counts)
-
-
 def test_a_stage_that_moves_to_and_fro_is_noticed(photos: Path, tmp_path: Path, capsys) -> None:
     to_and_fro = [(k, 2 - l if k % 2 else l) for k, l in np.ndindex(3, 3)]
     told = pages(photos, tmp_path / "mine", to_and_fro)
@@ -183,20 +172,12 @@ def test_other_sources(tmp_path: Path, capsys) -> None:
         ("folder", [*NAMED, "--inverted"], "--inverted"),
         ("folder", [*NAMED, "--counts", "--linear"], "--linear"),
         ("array", [*CAMERAS, "--lens-pitch-px", 6, 6], "--lens-pitch-px"),
-        ("array", [*CAMERAS, "--counts", "--width", 0], "--width"),
     ],
 )
 def test_options_that_do_not_go_with_a_source_are_refused(tmp_path, capsys, make, options, flags) -> None:
     makers = {"hci": hci(), "lenses": lens_picture, "folder": folder(), "array": array(LIGHT)}
-    words = f"error: {flags}: not for .*, which is read as: "
+    words = f"error: {flags}: not for .*, which is read as "
     check_refused(makers[make](tmp_path), tmp_path / "out", options, words, capsys)
-
-
-def test_a_sensor_without_colours_may_be_said_to_have_no_pattern(tmp_path: Path) -> None:
-    np.save(tmp_path / "in.npy", np.ones((2, 2, H, W), np.uint8))
-    told = ["--counts", "--cfa", "none", *CAMERAS]
-    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *told) == 0
-    assert open_dataset(tmp_path / "out").cfa is None
 
 
 # What is wrong: a folder, the options, and words of the one sentence
@@ -237,16 +218,6 @@ def turned(kind: str) -> Make:
         Image.new("RGB", (W, H)).save(root / "0_0.png", kind, exif=exif)
 
     return make
-
-
-def exr_of_two_parts(root: Path) -> None:
-    import OpenEXR
-
-    parts = [
-        OpenEXR.Part({}, {"RGB": np.ones((H, W, 3), np.float32)}, name=name) for name in ("left", "right")
-    ]
-    with OpenEXR.File(parts) as file:
-        file.write(str(root / "0_0.exr"))
 
 
 def frames(root: Path) -> Path:
@@ -300,15 +271,6 @@ def lens_picture(root: Path) -> Path:
     return root / "in.png"
 
 
-def npz(root: Path) -> Path:
-    np.savez(root / "in.npz", a=np.zeros(3), b=np.zeros(3))
-    return root / "in.npz"
-
-
-def stack(root: Path) -> None:
-    tifffile.imwrite(root / "0_0.tif", np.zeros((3, H, W), np.uint8), photometric="minisblack")
-
-
 def two_sizes(root: Path) -> None:
     for size in (H, H + 1):
         tifffile.imwrite(root / "0_0.tif", np.zeros((size, W), np.uint8), append=size > H)
@@ -317,11 +279,6 @@ def two_sizes(root: Path) -> None:
 def channels(root: Path) -> None:
     frames = np.zeros((4, 2, H, W), np.uint8)
     tifffile.imwrite(root / "0_0.tif", frames, imagej=True, metadata={"axes": "TCYX"})
-
-
-def hyphens(root: Path) -> None:
-    for number in range(4):
-        write(root / f"v-{number + 1}.png", numbers(0, 0))
 
 
 def tiff_of(number: int) -> Make:
@@ -337,17 +294,12 @@ FLOATS = EXR | {"dtype": np.float32}
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
-    ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; there are no files"),
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
     ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "missing of 5 x 5 views: 1_1.png"),
     ("pattern that leaves the folder", folder(), ["--pattern", "../{index}.png", *CAMERAS], "pattern: expected {row}"),
-    ("two of one view", folder(lambda r: write(r / "00_0.png", numbers(0, 0))), NAMED, "is of the same view as"),
-    ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "the numbers in"),
+    ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "too far apart for a grid"),
     ("no square", folder(lambda r: [p.rename(r / f"{n}.png") for n, p in enumerate(sorted(r.iterdir()))]), ["--pattern", "{index}.png", *CAMERAS], "6 views are no square grid; .*--grid"),
-    ("other grid", folder(), [*NAMED, "--grid", 3, 3], "gives 2 rows and 3 columns, not those of --grid"),
     ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
-    ("sensor and pixel", folder(), [*NAMED, "--pixel-mm", 1], "either the side of a pixel or the width"),
-    ("cfa unknown", folder(), [*NAMED, "--cfa", "RGB"], "cfa: there is no Bayer pattern"),
     ("mixed sizes", folder(lambda r: write(r / "1_1.png", numbers(0, 0)[:5])), NAMED, "5 x 8 px, .* where 0_0.png has 6 x 8"),
     ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
     ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
@@ -355,27 +307,20 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("cut off", folder(cut("1_0.png")), NAMED, "1_0.png: damaged or cut off"),
     ("no picture", folder(content("0_0.png", b"GIF89a" + bytes(99))), NAMED, "0_0.png: not a PNG, JPEG, TIFF or EXR"),
     ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "exceeds limit of"),
-    ("parts of EXR", folder(exr_of_two_parts, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: has 2 parts"),
     ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),
     ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
-    ("another number of views", array(LIGHT[0]), [*CAMERAS, "--grid", 2, 3], "has 2 views, where --grid is of 2 x 3"),
+    ("another number of views", array(LIGHT[0]), [*CAMERAS, "--grid", 2, 3], "2 views are not 2 x 3"),
     ("pages of two sizes", folder(two_sizes, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "pictures of different sizes or types"),
     ("channels as pages", folder(channels, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
-    ("hyphen of a name", folder(hyphens), ["--pattern", "v{index}.png", *CAMERAS], "all numbers are below 0; write the hyphen"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
-    ("NaN in array", array(LIGHT * np.nan), CAMERAS, r"view \(0, 0\) holds NaN"),
-    ("objects", array(np.array([None, {}], dtype=object)), CAMERAS, "not a NumPy array"),
-    ("no array", file("in.npy", b"not an array"), CAMERAS, "not a NumPy array"),
     ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),
-    ("other frames", frames, ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "1_0.tif: .* 5 pages, where .* 7 pages"),
+    ("other frames", frames, ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "1_0.tif: has frames uint8 .5, 6, 8., where .*0_0.tif has uint8 .7, 6, 8."),
     ("counts in colour", folder(), [*NAMED, "--counts"], "has 3 channels; photon counts have one"),
     ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
     ("lenses beyond", lens_picture, ["--lens-array", 1, 2, "--lens-pitch-px", 4.5, 6, *CAMERAS], "reach to 8.75, and the picture is 8 px wide"),
-    ("no section", hci("[intrinsics]\n", ""), [], "not a file of parameters"),
     ("more cameras than views", hci("num_cams_x = 3", "num_cams_x = 4"), [], "missing of 3 x 4 views: input_Cam009.png, input_Cam010.png, input_Cam011.png"),
     ("byte order", hci(maps=swapped), [], "the sign of the scale in its header"),
-    ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 8 x 6 px, where the views are 6 x 8"),
-    ("depth 0", hci(maps=true_depth(np.zeros((H, W)))), [], "depths are not between"),
+    ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 8 x 6 px, .* and the views 6 x 8"),
 ]  # fmt: skip
 
 

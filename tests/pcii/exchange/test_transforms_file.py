@@ -70,31 +70,18 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     assert find_grid(file).pitch_mm == (10, 10)
 
 
-def test_a_photon_cube_says_so(tmp_path: Path) -> None:
-    """The file that visionsim writes: one file of pictures, none in the frames."""
-    frames = [{"transform_matrix": MATRIX}, {"transform_matrix": MATRIX}]
-    file = read(tmp_path, frames, file_path="frames.npy", bitpack=True, bitpack_dim=2, c=1)
-    assert (file.is_bitpacked, file.is_stack) == (True, True)
-    assert file.frame_name(1) == "frames.1"
-    assert not read(tmp_path, frames_of(1, 1)).is_bitpacked
-
-
 @pytest.mark.parametrize(
     ("top", "told"),
     [
         ({"fl_x": None, "fl_y": None}, "fl_x: missing"),
         ({"w": None}, "images/0_0.png: there is no such file"),
         ({"h": 480.5}, "h: "),
-        ({"w": -3}, "w: "),
         ({"fl_x": "long"}, "fl_x: "),
-        ({"fl_x": 10**400}, "fl_x: "),
         ({"fl_y": 1010.0}, "fl_y: is 1010 where fl_x is 1000; pixels that are not square"),
         ({"fl_x": None, "fl_y": None, "camera_angle_x": 4}, "camera_angle_x: "),
         ({"p2": -1e-7}, "frames.0: the lens distorts"),
         ({"is_fisheye": True}, "frames.0: the lens distorts"),
-        ({"distortion_params": [0, 0, 0.1]}, "frames.0: the lens distorts"),
         ({"camera_model": "OPENCV_FISHEYE"}, "camera_model: expected one of OPENCV"),
-        ({"applied_scale": 0}, "applied_scale: "),
         ({"file_path": "../frames.npy"}, "file_path: expected a path inside the folder"),
     ],
 )
@@ -112,22 +99,13 @@ def test_members_at_the_top_that_are_wrong_are_named(tmp_path: Path, top, told) 
         ({"transform_matrix": None}, "transform_matrix: "),
         ({"transform_matrix": MATRIX[:3]}, "transform_matrix: expected four rows of four numbers"),
         ({"transform_matrix": changed(3, 3, 2)}, "transform_matrix: expected four rows of four numbers"),
-        ({"transform_matrix": changed(0, 3, 1e300)}, "transform_matrix.0.3: "),
         ({"transform_matrix": changed(0, 1, 0.3)}, "transform_matrix: is no rotation"),
-        ({"transform_matrix": scaled(0)}, "transform_matrix: is no rotation"),
         ({"transform_matrix": scaled(2.5)}, "transform_matrix: is no rotation; .* scale by 2.5 to 2.5"),
-        ({"transform_matrix": scaled(-1, slice(1, 2))}, "transform_matrix: is no rotation"),
         ({"file_path": None}, "file_path: expected a path inside the folder"),
-        ({"file_path": "/etc/passwd"}, "file_path: expected a path inside the folder"),
         ({"file_path": "images/../../x.png"}, "file_path: expected a path inside the folder"),
-        ({"file_path": "a\0b.png"}, "file_path: expected a path inside the folder"),
         ({"file_path": "out/secret.png"}, "file_path: expected a path inside the folder"),
-        ({"file_path": "."}, "file_path: expected a path inside the folder"),
-        ({"file_path": "./images/0_0.png"}, "file_path: is that of frames.0 too"),
-        ({"depth_file_path": "../d.npy"}, "depth_file_path: expected a path inside the folder"),
         ({"w": 320}, "480 x 320 px"),
         ({"fl_x": 1100, "fl_y": 1100}, "480 x 640 px and a focal length of 1100 px"),
-        ({"is_fisheye": True}, "the lens distorts"),
     ],
 )
 def test_members_of_a_frame_that_are_wrong_are_named(tmp_path: Path, frame, told) -> None:
