@@ -7,7 +7,7 @@ from cyclopts import App, Parameter
 
 from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection_layout import IN_FRAMES, Half
 
@@ -35,7 +35,7 @@ def run(
     out: Out,
     half: OfHalf = "test",
     budget: tuple[str, ...] = (),
-    executor: Workers = ALONE,
+    executor: Workers = THIS_PROCESS,
 ) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
@@ -75,7 +75,9 @@ def run(
 
 
 @benchmark.command
-def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = ALONE) -> None:
+def score(
+    folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = THIS_PROCESS
+) -> None:
     """Score maps of depth and masks that were made elsewhere, after checking all of them.
 
     FOLDER has submission.json, and for each dataset and light a folder such as ramp_photons_1/1000 with

@@ -12,7 +12,7 @@ from pcii.app.results import Results
 from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
 from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD
 
@@ -160,7 +160,7 @@ def evaluate(
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
     z_mm: Depths = (),
-    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 

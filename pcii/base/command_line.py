@@ -15,7 +15,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pcii.base.command_output import complain
-from pcii.base.errors import InputError
+from pcii.base.errors import InputError, WorkerLostError
 from pcii.base.progress import Stages, quiet, shown_by
 
 if TYPE_CHECKING:
@@ -161,6 +161,8 @@ def _failed(fault: Exception) -> int:
     """Print a message for the exception and return the exit code."""
     if isinstance(fault, InputError):
         return _fail(2, "\n".join([str(fault), *getattr(fault, "__notes__", ())]))
+    if isinstance(fault, WorkerLostError):
+        return _fail(1, str(fault))
     if isinstance(fault, BrokenPipeError):  # the reader closed the pipe, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141

@@ -20,6 +20,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numba as nb
 from numba.core import event
 
+from pcii.base.executor import threads_of_worker
 from pcii.base.progress import report_compiling
 
 compiled = nb.njit(nogil=True, cache=True)
@@ -34,7 +35,7 @@ Result = TypeVar("Result")
 PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
-_threads: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+_threads: int | None = None
 _pool: ThreadPoolExecutor | None = None
 
 
@@ -45,7 +46,7 @@ def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[An
     ranges, this one among them. Results come in the order of the ranges; how many
     there are depends on the number of threads.
     """
-    parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1
+    parts = min(count, PARTS_PER_THREAD * threads()) if threads() > 1 else 1
     if parts <= 1:
         return [loop(0, count, *arguments)]
     ends = [count * part // parts for part in range(parts + 1)]
@@ -64,7 +65,7 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
         for place in waiting:
             results[place] = function(items[place])
 
-    others = [_thread_pool().submit(work) for _ in range(min(_threads, len(items)) - 1)]
+    others = [_thread_pool().submit(work) for _ in range(min(threads(), len(items)) - 1)]
     work()
     for other in others:
         if not other.cancel():  # it had not begun: all is done
@@ -98,19 +99,20 @@ def shared(
 def use_threads(count: int) -> None:
     """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
     global _threads
-    _threads = min(count, nb.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    _threads = count
     _forget_pool()
 
 
 def threads() -> int:
-    """Number of threads that share a loop."""
-    return _threads
+    """Number of threads that share a loop: all cores, a worker's share of them, or that of `use_threads`."""
+    allowed: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    return min(_threads or threads_of_worker() or allowed, allowed)
 
 
 def _thread_pool() -> ThreadPoolExecutor:
     global _pool
     if _pool is None:
-        _pool = ThreadPoolExecutor(_threads - 1, "loops")
+        _pool = ThreadPoolExecutor(threads() - 1, "loops")
     return _pool
 
 

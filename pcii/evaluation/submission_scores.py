@@ -13,7 +13,7 @@ from typing import Any
 
 from pcii.base.command_output import MOST_COMPLAINTS
 from pcii.base.errors import InputError
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors, write_json_safely
@@ -47,7 +47,7 @@ def run_method(
     *,
     half: Half = "test",
     budgets: Sequence[float | str] = (),
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score a method on one half of a benchmark, in the folder `out`; the figures of `summarise`.
@@ -83,7 +83,7 @@ def score_submission(
     out: Path,
     *,
     half: Half = "test",
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score the maps in a folder (`submitted_maps`) on one half of a benchmark; the figures of `summarise`.

@@ -22,6 +22,8 @@ from pcii.store.hashes import hash_bytes, hash_file
 
 COLLECTION = "collection.json"
 INDEX = "index.jsonl"
+LOCK = ".lock"
+"""Locked while a run writes to the folder, and then removed."""
 REMEDY = "the same `simgen generate` command makes it again from the datasets"
 COLLECTION_FOLDER = FolderKind(
     "collection",
@@ -30,6 +32,7 @@ COLLECTION_FOLDER = FolderKind(
     absent=f"not a collection (no {COLLECTION}); make one with `simgen generate`",
     remedy=REMEDY,
     marks=frozenset({COLLECTION}),
+    passing=frozenset({LOCK}),
 )
 Split = Literal["train", "validation", "test"]
 Half = Literal["development", "test"]
@@ -82,13 +85,8 @@ def read_collection(root: Path) -> dict[str, Any]:
 
 def write_index(root: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """Write the index, atomically."""
-    write_bytes_safely(root / INDEX, index_bytes(rows))
-
-
-def index_bytes(rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """The index of these rows as it is written."""
     lines = b"".join(json.dumps(row, allow_nan=False).encode() + b"\n" for row in rows)
-    return lines + _seal(lines)
+    write_bytes_safely(root / INDEX, lines + _seal(lines))
 
 
 def _seal(lines: bytes) -> bytes:

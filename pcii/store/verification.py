@@ -10,6 +10,7 @@ from pcii.base.progress import Report, Stages, silent
 from pcii.store.collection_layout import (
     COLLECTION,
     INDEX,
+    LOCK,
     check_manifest,
     is_collection,
     read_collection,
@@ -59,7 +60,7 @@ def _verify_collection(path: Path, report: Report) -> int:
     files = _all_of(
         rows, lambda row: 1 + _verify_folder(check_manifest(path, row), silent), "datasets", report
     )
-    listed = {COLLECTION, INDEX, CARD, *(row["path"] for row in rows)}
+    listed = {COLLECTION, INDEX, LOCK, CARD, *(row["path"] for row in rows)}
     extra = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
     begun = [name for name in extra if (path / name / MARKER).is_file()]
     _refuse(path, [name for name in extra if name not in begun], INDEX)
