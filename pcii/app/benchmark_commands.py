@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from pcii.app.command_options import Out
-from pcii.base.command_output import say, say_next_page
+from pcii.base.command_line import say, say_next_page
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection_layout import IN_FRAMES, Half
@@ -51,8 +51,7 @@ def run(
     Parameters
     ----------
     method
-        A method of removal, or depth:NAME; or module:function, of the working directory or installed, and
-        depth:module:function.
+        A method of removal, or depth:NAME; or module:function or file.py:function, after depth: for depth.
     out
         Folder for the scores: new, empty, or those of an earlier run, which is extended.
     budget

@@ -11,7 +11,7 @@ from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
 from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
-from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
+from pcii.base.command_line import answer_json, results_folder, say, say_next, say_next_page
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD
@@ -179,7 +179,7 @@ def evaluate(
     out
         Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
-        A method of removal, as in `pcii segment`, or depth:NAME, as in `pcii depth` ("depth": the default
+        A method of removal, as in `pcii segment`, or depth: and one as in `pcii depth` ("depth": the default
         one); may be repeated. Default: all that can take the data.
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.

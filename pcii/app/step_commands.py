@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from pcii.app.command_options import Budget, Depths, Out, budget_words, opened
 from pcii.app.results import Results
-from pcii.base.command_output import say, say_next
+from pcii.base.command_line import say, say_next
 from pcii.store.dataset import Dataset
 
 Steps = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(name="--without")]

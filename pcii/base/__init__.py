@@ -1,14 +1,11 @@
 """Tools that know nothing of cameras: errors, progress, commands, compiled loops, sRGB.
 
-command_line      Running of command lines: help, error messages of one sentence, exit codes, --quiet, and
-                  Ctrl-C.
-command_output    What a command prints: what it did, what was asked for, and the next command to type.
+command_line      Command lines: help, what they print, errors of one sentence, exit codes, --quiet, Ctrl-C.
 compiled_loops    Compilation of loops with Numba, which needs no system library.
 errors            Exceptions whose sentence is all that a command prints of them.
 executor          Where the pieces of work are done: in this process, in local worker processes, or on a
                   Dask cluster.
-extensions        Methods by name: built-in ones and entry points of installed packages; calls of
-                  functions of theirs.
+extensions        Functions of others: entry points of installed packages, module:function, file.py:function.
 plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
                   visible.
 progress          Progress of long work, compilation included: bars on a terminal, plain lines in a log.

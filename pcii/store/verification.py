@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pcii.base.command_output import answer_json, say
+from pcii.base.command_line import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, Stages, silent
 from pcii.store.collection_layout import (

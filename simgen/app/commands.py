@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from pcii.base import command_line
-from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
+from pcii.base.command_line import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection_layout import Half
@@ -130,7 +130,7 @@ def generate(
         faults = generate_sweep(sweep, out, executor, report)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
     if faults:
-        complain_of(faults, "not made: ", " were not made")
+        complain_of(faults, "not made: ")
         return 1
     say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
     return 0
