@@ -89,18 +89,6 @@ def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> N
     assert command_line.run(simgen_cli.app, ["verify", str(out)]) == 0
 
 
-@pytest.mark.renders
-def test_a_generate_stopped_at_a_terminal_says_so_below_its_bars(tmp_path: Path) -> None:
-    out = tmp_path / "small"
-    process, controller = at_a_terminal(generating(out, 64))
-    wait_for(out / "radiance" / "view_00_02.exr")  # told of the first two
-    process.send_signal(signal.SIGINT)
-    said = all_text(controller)
-    assert process.wait(timeout=60) == 130
-    assert "views" in said
-    assert said.splitlines()[-1].endswith(ON)
-
-
 went_on: list[str] = []
 
 
@@ -271,13 +259,6 @@ def test_a_verification_for_scripts_tells_the_fault(
         assert str(tmp_path) in bad["fault"]
 
 
-@pytest.mark.renders
-def test_the_renderer_is_told_to_scripts(capsys: pytest.CaptureFixture[str]) -> None:
-    text = json_of(simgen_cli.app, ["doctor"], capsys)
-    assert isinstance(text, dict)
-    assert text["chosen"]["kind"] in {each["kind"] for each in text["candidates"] if each["works"]}
-
-
 def test_depths_as_they_are_typed() -> None:
     assert depths_mm("540") == [540.0]
     assert depths_mm("500:700:20") == [float(z) for z in range(500, 701, 20)]
@@ -353,10 +334,9 @@ def test_help_has_no_negative_options_no_empty_defaults_and_no_colours_in_a_pipe
                 assert "--quiet" in text
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_is_installed_where_the_shell_looks(shell: str, tmp_path: Path) -> None:
+def test_completion_is_installed_where_the_shell_looks(tmp_path: Path) -> None:
     script = "import sys; from pcii.app.commands import main; sys.exit(main())"
-    command = [sys.executable, "-c", script, "--install-completion", "--shell", shell]
+    command = [sys.executable, "-c", script, "--install-completion", "--shell", "bash"]
     subprocess.run(command, env=os.environ | {"HOME": str(tmp_path)}, capture_output=True, check=True)
     files = [file.read_text() for file in tmp_path.rglob("*") if file.is_file()]
     assert any("verify" in text and "pcii" in text for text in files)

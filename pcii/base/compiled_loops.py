@@ -1,14 +1,9 @@
 """Compilation of loops with Numba, which needs no system library, and their threads.
 
-Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
-longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
-that is not writable, so each loop is compiled once per machine. All loops together take half a minute, so
-it is announced (`progress`): as a stage of a command, and in one line where another program imports this
-package.
-
-Loops are shared among threads by ranges of their outermost index (`shared`, `in_threads`). Numba's own
-parallel loops take twice as long to compile, and their OpenMP threads do not survive a fork. The same
-threads share out the steps of longer work (`each_in_threads`).
+Modules of loops are imported where a loop is about to run, since importing Numba takes longer than the rest
+of the package. Compiled code is cached on disk, so each loop is compiled once per machine, which is announced
+(`progress`). Threads share loops by ranges of their outermost index: Numba's own parallel loops take twice as
+long to compile, and their OpenMP threads do not survive a fork.
 """
 
 import os
@@ -42,9 +37,8 @@ _pool: ThreadPoolExecutor | None = None
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
     """Results of `loop(first, last, *arguments)` for ranges that share 0 .. `count` - 1.
 
-    The loop is compiled, or spends its time in a library that lets other threads run. Several threads run the
-    ranges, this one among them. Results come in the order of the ranges; how many
-    there are depends on the number of threads.
+    The loop is compiled, or spends its time in a library that lets other threads run. Results come in the
+    order of the ranges; how many there are depends on the number of threads.
     """
     parts = min(count, PARTS_PER_THREAD * threads()) if threads() > 1 else 1
     if parts <= 1:
@@ -54,10 +48,7 @@ def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[An
 
 
 def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """`function` of each item, in their order; several threads take one item at a time, this one among them.
-
-    They gain where the function spends its time in compiled loops or in NumPy.
-    """
+    """`function` of each item, in their order; threads take one item at a time, this one among them."""
     results: list[Any] = [None] * len(items)
     waiting = iter(range(len(items)))
 

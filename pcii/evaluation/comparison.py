@@ -86,9 +86,11 @@ def evaluate(
         _check_sendable(named)
     tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
     again = measure(EvaluationJob(tasks, folder.resolve()), executor, report)
+    report("pages", 0, 1)
     with all_rows(folder) as rows, named_in_errors(folder):
         result = summarise(rows) | {"again": again}
         write_evaluation(folder, result)
+    report("pages", 1, 1)
     return result
 
 
@@ -114,6 +116,8 @@ def measure(job: "EvaluationJob", executor: Executor, report: Report) -> list[di
     again = _again([tasks[number] for number in remaining], made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
+    if remaining:
+        report("scores", 0, len(remaining))
     with closing(executor.run(job, remaining, report)) as work:
         for finished, _ in enumerate(work, start=1):
             report("scores", finished, len(remaining))

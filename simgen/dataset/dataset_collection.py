@@ -66,6 +66,7 @@ def generate_collection(
     rows, faults, pieces = list[Row](), list[str](), range(len(series))
     with named_in_errors(out), _claim(out):
         _begin(series, out)
+        report("datasets", 0, len(pieces))
         try:
             with closing(executor.run(DatasetJob(series, out), pieces, report)) as results:
                 for _, result in results:
