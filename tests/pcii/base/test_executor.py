@@ -63,7 +63,7 @@ def test_each_piece_is_done_once_and_each_process_keeps_its_copy(tmp_path: Path,
     assert sorted(piece for piece, _ in work.begun()) == list(range(20))
     by_process = [process for _, process in work.begun()]
     counts = [by_process.count(process) for process in set(by_process)]
-    assert len(counts) == workers
+    assert len(counts) <= workers
     assert sorted(count for _, count, _ in results.values()) == sorted(
         number + 1 for count in counts for number in range(count)
     )
