@@ -1,14 +1,11 @@
 """Where the pieces of work are done: in this process, in local worker processes, or on a Dask cluster."""
 
 import logging
-import multiprocessing
 import os
 import pickle
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -108,12 +105,15 @@ def _results(
 
 
 def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generator[tuple[int, Any]]:
+    import multiprocessing
+    from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+
     pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
     # Not forked: what other threads hold locked would be locked for ever in the copy.
     spawning = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count, spawning, _begin_worker, (pickled, threads))
 
-    def submit(piece: int) -> Future[Any]:
+    def submit(piece: int) -> Any:
         # Workers inherit the mask: Ctrl-C reaches all processes, and this one ends the others.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
@@ -152,7 +152,9 @@ def _do_in_worker(piece: int) -> Any:
 
 def _end_with_starter() -> None:
     """End this process, in the midst of a piece too, when the one that started it was killed."""
-    starter = multiprocessing.parent_process()
+    from multiprocessing import parent_process
+
+    starter = parent_process()
     assert starter is not None
     starter.join()
     os._exit(1)

@@ -4,7 +4,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 from pcii.base.plain_text import visible
@@ -117,6 +116,8 @@ def report_compiling(loops: int, *, running: bool, own: bool) -> None:
     used as a library only if the loop is its `own`.
     """
     global _has_announced
+    from multiprocessing import parent_process
+
     if _showing and _showing[-1].has_bars:
         _showing[-1](COMPILING, loops - running, None if running else loops)
     elif (_showing or own) and not _has_announced and not is_quiet():
