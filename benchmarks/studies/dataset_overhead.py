@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.figures import curve, frame
 from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.timing import median_of
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.store.collection import open_collection
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.spec.sweeps import load_sweep
@@ -50,8 +50,8 @@ def measure(counts: Sequence[int], repeats: int) -> Measured:
             for repeat in range(repeats):
                 out = Path(folder) / f"{count}_{repeat}"
                 works: dict[str, Callable[[], object]] = {
-                    MADE: partial(generate_collection, sweep, out, ALONE),
-                    FOUND: partial(generate_collection, sweep, out, ALONE),
+                    MADE: partial(generate_collection, sweep, out, THIS_PROCESS),
+                    FOUND: partial(generate_collection, sweep, out, THIS_PROCESS),
                     TASKS: partial(generate_collection, sweep, out, dask),
                     OPENED: partial(open_collection, out),
                 }

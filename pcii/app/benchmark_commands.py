@@ -6,8 +6,8 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from pcii.app.command_options import Out
-from pcii.base.command_output import say, say_next_page
-from pcii.base.executor import ALONE, Executor
+from pcii.base.command_line import say, say_next_page
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation.benchmark_collection import open_benchmark
 from pcii.evaluation.benchmark_page import write_page
@@ -39,7 +39,7 @@ def run(
     out: ScoresOut,
     half: OfHalf = "test",
     budget: tuple[str, ...] = (),
-    executor: Workers = ALONE,
+    executor: Workers = THIS_PROCESS,
 ) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
@@ -53,8 +53,7 @@ def run(
     Parameters
     ----------
     method
-        A method of removal, or depth:NAME; or module:function, of the working directory or installed, and
-        depth:module:function.
+        A method of removal, or depth:NAME; or module:function or file.py:function, after depth: for depth.
     budget
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
@@ -65,7 +64,7 @@ def run(
 
 @benchmark.command
 def score(
-    folder: Path, *, data: Data, out: ScoresOut, half: OfHalf = "test", executor: Workers = ALONE
+    folder: Path, *, data: Data, out: ScoresOut, half: OfHalf = "test", executor: Workers = THIS_PROCESS
 ) -> None:
     """Score maps of depth and masks that were made elsewhere, after checking all of them.
 

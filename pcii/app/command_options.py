@@ -1,16 +1,12 @@
 """Options that several commands take: folders, depths, a light, methods."""
 
-import importlib
 import math
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import CoercionError, Parameter
 
-from pcii.base.errors import InputError
-from pcii.base.extensions import name_of
 from pcii.store.dataset import Dataset, budget_of, open_dataset
 from pcii.types.arrays import MOST_DEPTHS
 
@@ -65,35 +61,6 @@ def budget_words(dataset: Dataset) -> list[str]:
     """The option that gives the budget at which a dataset is looked at."""
     budget = dataset.budget
     return [] if budget is None else ["--budget", budget if isinstance(budget, str) else f"{budget:g}"]
-
-
-def method_of(text: str) -> str | Function:
-    """A method as it is typed: its name, or the function that module:function or file.py:function means.
-
-    Modules are those of the working directory or installed. Raises `InputError` if there is no such function.
-    """
-    place, colon, name = text.rpartition(":")
-    if not colon:
-        return text
-    file = Path(place)
-    is_file = file.suffix == ".py"
-    folder, module = (str(file.resolve().parent), file.stem) if is_file else ("", place)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    try:
-        function = getattr(importlib.import_module(module), name)
-    except Exception as fault:  # importing a module of others may raise anything
-        raise InputError(f"method: {text!r} cannot be loaded: {type(fault).__name__}: {fault}") from None
-    if not callable(function):
-        raise InputError(f"method: {text!r} is no function")
-    return function
-
-
-def evaluated_method(text: str) -> str | tuple[str, Function]:
-    """A method of an evaluation, where depth: stands before one of depth; a function with its name."""
-    prefix = "depth:" if text.startswith("depth:") else ""
-    method = method_of(text.removeprefix(prefix))
-    return text if isinstance(method, str) else (prefix + name_of(method), method)
 
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]

@@ -6,12 +6,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pcii.app.benchmark_commands import benchmark
-from pcii.app.command_options import Depths, Json, Out, evaluated_method
+from pcii.app.command_options import Depths, Json, Out
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
-from pcii.base.command_output import results_folder, say, say_next, say_next_page
-from pcii.base.executor import ALONE, Executor
+from pcii.base.command_line import results_folder, say, say_next, say_next_page
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
 from pcii.store.dataset import copy_sample
@@ -52,7 +52,7 @@ def evaluate(
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
     z_mm: Depths = (),
-    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
@@ -71,7 +71,7 @@ def evaluate(
     out
         Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
-        A method of removal, as in `pcii segment`, or depth:NAME, as in `pcii depth` ("depth": the default
+        A method of removal, as in `pcii segment`, or depth: and one as in `pcii depth` ("depth": the default
         one); may be repeated. Default: all that can take the data.
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
@@ -79,10 +79,9 @@ def evaluate(
         Depth of a section in mm, or start:stop:step; repeat for more. Default: those that each dataset
         suggests.
     """
-    methods = [evaluated_method(text) for text in method]
     with Stages() as report:
         evaluation = comparison.evaluate(
-            datasets, out, methods=methods, budgets=budget, z_mm=z_mm, executor=executor, report=report
+            datasets, out, methods=method, budgets=budget, z_mm=z_mm, executor=executor, report=report
         )
     if evaluation["made"]["differing"]:
         differing = ", ".join(evaluation["made"]["differing"])

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
-from pcii.base.command_output import answer, results_folder, say, say_next
+from pcii.base.command_line import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.exchange.camera_fit import CameraFit, check_grid

@@ -15,10 +15,9 @@ from pcii.app.command_options import (
     SectionDepths,
     budget_words,
     dataset_at,
-    method_of,
 )
 from pcii.app.pipeline import full_light_sections
-from pcii.base.command_output import answer, answer_json, say, say_next, say_next_page
+from pcii.base.command_line import answer, answer_json, say, say_next, say_next_page
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
@@ -66,9 +65,8 @@ def run(
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     z_range_mm = z_range_mm or depth_range_of(data, planes)
-    methods, estimator = [method_of(text) for text in method], method_of(depth_method)
     with Stages() as report:
-        outcome = results.run(data, out, planes, z_range_mm, methods, estimator, report)
+        outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -143,10 +141,10 @@ def depth(
         posterior or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
-    data, estimator = dataset_at(dataset, budget), method_of(method)
+    data = dataset_at(dataset, budget)
     near, far = z_range_mm or depth_range_of(data)
     with results.writing(out, data) as folder:
-        depth_map = estimate_depth(data.counts_or_views, (near, far), method=estimator)
+        depth_map = estimate_depth(data.counts_or_views, (near, far), method=method)
         results.save_depth(folder, depth_map)
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
@@ -177,10 +175,10 @@ def segment(
         shape-from-focus (for comparison); or one that a package registers, module:function, or
         file.py:function.
     """
-    data, remove = dataset_at(dataset, budget), method_of(method)
+    data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
-        focus = removal.segment(data.counts, planes, method=remove)
+        focus = removal.segment(data.counts, planes, method=method)
         results.save_segmented(folder, focus)
         names = [f"in_focus_{focus.method}_{z:g}mm.png" for z in focus.z_mm]
         for name, mask in zip(names, focus.in_focus, strict=True):

@@ -1,14 +1,9 @@
 """Compilation of loops with Numba, which needs no system library, and their threads.
 
-Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
-longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
-that is not writable, so each loop is compiled once per machine. All loops together take half a minute, so
-it is announced (`progress`): as a stage of a command, and in one line where another program imports this
-package.
-
-Loops are shared among threads by ranges of their outermost index (`shared`, `in_threads`). Numba's own
-parallel loops take twice as long to compile, and their OpenMP threads do not survive a fork. The same
-threads share out the steps of longer work (`each_in_threads`).
+Modules of loops are imported where a loop is about to run, since importing Numba takes longer than the rest
+of the package. Compiled code is cached on disk, so each loop is compiled once per machine, which is announced
+(`progress`). Threads share loops by ranges of their outermost index: Numba's own parallel loops take twice as
+long to compile, and their OpenMP threads do not survive a fork.
 """
 
 import os
@@ -20,6 +15,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numba as nb
 from numba.core import event
 
+from pcii.base.executor import threads_of_worker
 from pcii.base.progress import report_compiling
 
 compiled = nb.njit(nogil=True, cache=True)
@@ -34,18 +30,17 @@ Result = TypeVar("Result")
 PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
-_threads: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+_threads: int | None = None
 _pool: ThreadPoolExecutor | None = None
 
 
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
     """Results of `loop(first, last, *arguments)` for ranges that share 0 .. `count` - 1.
 
-    The loop is compiled, or spends its time in a library that lets other threads run. Several threads run the
-    ranges, this one among them. Results come in the order of the ranges; how many
-    there are depends on the number of threads.
+    The loop is compiled, or spends its time in a library that lets other threads run. Results come in the
+    order of the ranges; how many there are depends on the number of threads.
     """
-    parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1
+    parts = min(count, PARTS_PER_THREAD * threads()) if threads() > 1 else 1
     if parts <= 1:
         return [loop(0, count, *arguments)]
     ends = [count * part // parts for part in range(parts + 1)]
@@ -53,10 +48,7 @@ def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[An
 
 
 def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """`function` of each item, in their order; several threads take one item at a time, this one among them.
-
-    They gain where the function spends its time in compiled loops or in NumPy.
-    """
+    """`function` of each item, in their order; threads take one item at a time, this one among them."""
     results: list[Any] = [None] * len(items)
     waiting = iter(range(len(items)))
 
@@ -64,7 +56,7 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
         for place in waiting:
             results[place] = function(items[place])
 
-    others = [_thread_pool().submit(work) for _ in range(min(_threads, len(items)) - 1)]
+    others = [_thread_pool().submit(work) for _ in range(min(threads(), len(items)) - 1)]
     work()
     for other in others:
         if not other.cancel():  # it had not begun: all is done
@@ -98,19 +90,20 @@ def shared(
 def use_threads(count: int) -> None:
     """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
     global _threads
-    _threads = min(count, nb.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    _threads = count
     _forget_pool()
 
 
 def threads() -> int:
-    """Number of threads that share a loop."""
-    return _threads
+    """Number of threads that share a loop: all cores, a worker's share of them, or that of `use_threads`."""
+    allowed: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    return min(_threads or threads_of_worker() or allowed, allowed)
 
 
 def _thread_pool() -> ThreadPoolExecutor:
     global _pool
     if _pool is None:
-        _pool = ThreadPoolExecutor(_threads - 1, "loops")
+        _pool = ThreadPoolExecutor(threads() - 1, "loops")
     return _pool
 
 

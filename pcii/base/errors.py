@@ -1,4 +1,4 @@
-"""The exception that is raised for invalid input."""
+"""Exceptions whose sentence is all that a command prints of them."""
 
 
 class InputError(ValueError):
@@ -9,5 +9,5 @@ class InputError(ValueError):
     """
 
 
-class BusyError(InputError):
-    """Another process is at this work."""
+class WorkerLostError(RuntimeError):
+    """A process that did a part of the work has died, or a cluster is out of reach."""

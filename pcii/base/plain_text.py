@@ -22,7 +22,7 @@ def visible(text: str) -> str:
     >>> visible("two" + chr(10) + "lines")
     'two\\\\nlines'
     """
-    return UNSEEN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def in_terminal(text: str) -> str:
@@ -42,7 +42,7 @@ def in_json(value: Any, indent: int | None = None) -> str:
     "caf\u00e9\\u009b"
     """
     text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
-    return "\n".join(UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", line) for line in text.split("\n"))
+    return "\n".join(UNSEEN.sub(lambda match: f"\\u{ord(match[0]):04x}", line) for line in text.split("\n"))
 
 
 def in_html(value: object) -> str:

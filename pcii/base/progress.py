@@ -2,118 +2,101 @@
 
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from pcii.base.plain_text import visible
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress, Task
 
+Report = Callable[[str, int, int], None]
+"""Type of a progress callback: report(stage, done, total)."""
 LOG_EVERY_S = 10.0
-RECENT_LINES = 6
-"""The time left follows from the pace since so many lines of a log ago."""
+PACE_OF_S = 60.0
+"""The time left follows from the pace of so many seconds: what an earlier run has finished passes at once."""
+COMPILING = "compiling (once per machine)"
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Report nothing: the default where progress is optional."""
 
 
 class Stages(AbstractContextManager["Stages"]):
     """Progress of named stages: bars with time left on a terminal, else a line every ten seconds.
 
-    Call it as stages(name, done, total); a stage ends when done reaches total.
+    Call it as stages(name, done, total); a stage ends when done reaches total. Work that goes on after that
+    is a stage of its own, which is called with 0 when it begins.
     """
 
     def __init__(self) -> None:
-        self._rich: Progress | None = None
-        self._tasks: dict[str, TaskID] = {}
-        self._started: dict[str, float] = {}
+        self.has_bars = False
+        self._progress: Progress | None = None
+        self._tasks: dict[str, Task] = {}
         self._logged: dict[str, float] = {}
-        self._recent: dict[str, deque[tuple[float, int]]] = {}
         self._shown = ExitStack()
 
     def __enter__(self) -> "Stages":
         self._shown.enter_context(shown_by(self))
-        if sys.stderr.isatty() and not is_quiet():
-            from rich.console import Console
-            from rich.progress import (
-                BarColumn,
-                MofNCompleteColumn,
-                Progress,
-                TextColumn,
-                TimeElapsedColumn,
-                TimeRemainingColumn,
-            )
-            from rich.table import Column
-
-            self._rich = Progress(
-                TextColumn("{task.description}", markup=False, table_column=Column()),  # which wraps
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TextColumn("left"),
-                TimeRemainingColumn(),
-                console=Console(stderr=True),
-            )
-            self._rich.start()
+        self.has_bars = sys.stderr.isatty() and not is_quiet()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *fault: object) -> None:
         self._shown.close()
-        if self._rich is not None:
-            self._rich.stop()
+        if self._progress is not None:
+            self._progress.stop()
 
-    def __call__(self, stage: str, done: int, total: int) -> None:
+    def __call__(self, stage: str, done: int, total: int | None) -> None:
         if is_quiet():
             return
-        stage = visible(stage)
-        if self._rich is not None:
-            if stage not in self._tasks:
-                self._tasks[stage] = self._rich.add_task(stage, total=total)
-            self._rich.update(self._tasks[stage], completed=done, total=total)
+        stage, now = visible(stage), time.monotonic()
+        goes_on = bool(self._tasks) and all(task.finished for task in self._tasks.values())
+        is_new = stage not in self._tasks
+        task, logged = self._updated(stage, done, total), self._logged.setdefault(stage, now)
+        if self.has_bars:
             return
-        now = time.monotonic()
-        start = self._started.setdefault(stage, now)
-        recent = self._recent.setdefault(stage, deque([(now, done)], RECENT_LINES))
-        if done == total or now - self._logged.get(stage, start) >= LOG_EVERY_S:
+        if done == total or now - logged >= LOG_EVERY_S or (is_new and goes_on):
             self._logged[stage] = now
-            # By the pace of the last minute: what an earlier run has finished passes in an instant.
-            before, done_before = recent[0]
-            new = done - done_before
-            left = f", {(now - before) / new * (total - done):.0f} s left" if new > 0 and done < total else ""
-            recent.append((now, done))
-            print(f"{stage}: {done}/{total}, {now - start:.1f} s{left}", file=sys.stderr, flush=True)
+            seconds_left = None if task.finished else task.time_remaining
+            left = "" if seconds_left is None else f", {seconds_left:.0f} s left"
+            line = f"{stage}: {done}/{total}, {task.elapsed or 0:.1f} s{left}"
+            print(line, file=sys.stderr, flush=True)
 
-    def compiling(self, loops: int, running: bool) -> None:
-        """Report how many loops were compiled, the last of which may be `running`; the total is unknown."""
-        if is_quiet():
-            return
-        if self._rich is not None:
-            if COMPILING not in self._tasks:
-                self._tasks[COMPILING] = self._rich.add_task(COMPILING, total=None)
-            done, total = (loops - 1, None) if running else (loops, loops)
-            self._rich.update(self._tasks[COMPILING], completed=done, total=total)
-            return
-        now = time.monotonic()
-        if COMPILING not in self._logged:
-            print(COMPILING, file=sys.stderr, flush=True)
-        elif not running and now - self._logged[COMPILING] >= LOG_EVERY_S:
-            print(f"{COMPILING}: {loops} so far", file=sys.stderr, flush=True)
-        else:
-            return
-        self._logged[COMPILING] = now
+    def _updated(self, stage: str, done: int, total: int | None) -> "Task":
+        """The task of Rich for a stage, brought up to date; bars are shown from the first one on."""
+        if self._progress is None:
+            from rich import progress as rich
+            from rich.console import Console
+            from rich.table import Column
+
+            self._progress = rich.Progress(
+                rich.TextColumn("{task.description}", markup=False, table_column=Column()),  # which wraps
+                rich.BarColumn(),
+                rich.MofNCompleteColumn(),
+                rich.TimeElapsedColumn(),
+                rich.TextColumn("left"),
+                rich.TimeRemainingColumn(),
+                console=Console(stderr=True),
+                disable=not self.has_bars,
+                speed_estimate_period=PACE_OF_S,
+                get_time=lambda: time.monotonic(),
+            )
+            self._progress.start()
+        if stage not in self._tasks:
+            number = self._progress.add_task(stage, total=total)
+            self._tasks[stage] = next(task for task in self._progress.tasks if task.id == number)
+        task = self._tasks[stage]
+        self._progress.update(task.id, completed=done, total=total)
+        return task
 
 
-COMPILING = "compiling (once per machine)"
 _showing: list[Stages] = []
 """Active progress displays; compilation is reported to the last. Empty where `pcii` is used as a library."""
-_announced: list[None] = []
-"""Not empty once this process, without a display, has announced that loops are compiled."""
+_has_announced = False
+"""Whether this process has announced, without bars, that loops are compiled."""
+_quiet: list[None] = []
+"""Not empty within a command that was told to be quiet."""
 
 
 @contextmanager
@@ -127,22 +110,20 @@ def shown_by(stages: Stages) -> Iterator[None]:
 
 
 def report_compiling(loops: int, *, running: bool, own: bool) -> None:
-    """Report to a running command that loop number `loops` is being compiled (`running`), or has been.
+    """Report that loop number `loops` is being compiled (`running`), or has been.
 
-    Where `pcii` is used as a library one line on standard error says so, once, if the loop is its `own`.
+    It is a stage where a command shows bars. Else one line on standard error says so, once; where `pcii` is
+    used as a library only if the loop is its `own`.
     """
-    if _showing:
-        _showing[-1].compiling(loops, running)
-    elif own and not _announced:
-        from multiprocessing import parent_process
+    global _has_announced
+    from multiprocessing import parent_process
 
-        _announced.append(None)
+    if _showing and _showing[-1].has_bars:
+        _showing[-1](COMPILING, loops - running, None if running else loops)
+    elif (_showing or own) and not _has_announced and not is_quiet():
+        _has_announced = True
         if parent_process() is None:  # else each of many workers would say so
-            print(f"pcii: {COMPILING}, which takes up to a minute", file=sys.stderr, flush=True)
-
-
-_quiet: list[None] = []
-"""Not empty within a command that was told to be quiet."""
+            print(f"{COMPILING}, which takes up to a minute", file=sys.stderr, flush=True)
 
 
 def is_quiet() -> bool:
@@ -158,11 +139,3 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         _quiet.pop()
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Report nothing: the default where progress is optional."""
-
-
-Report = Callable[[str, int, int], None]
-"""Type of a progress callback: report(stage, done, total)."""

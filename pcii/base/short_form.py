@@ -22,37 +22,35 @@ class ShortForm:
         """Names and values of what distinguishes this object, most important first; None is left out."""
         return vars(self)
 
-    def _known_facts(self) -> dict[str, object]:
-        return {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
-
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in self._known_facts().items())
+        facts = ", ".join(f"{name}={visible(text)}" for name, text in _texts(self._facts()).items())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
 
     def _repr_html_(self) -> str:
-        facts = self._known_facts().items()
-        rows = "".join(f"<tr><td>{in_html(name)}</td><td>{in_html(fact)}</td></tr>" for name, fact in facts)
-        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>{self._picture_html()}"
-
-    def _picture_html(self) -> str:
-        """What `plot` draws as an image in HTML; empty without `plot`, and for data that cannot be read."""
+        facts = _texts(self._facts()).items()
+        rows = "".join(f"<tr><td>{in_html(name)}</td><td>{in_html(text)}</td></tr>" for name, text in facts)
+        table = f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
         if not hasattr(self, "plot"):
-            return ""
+            return table
         from matplotlib import pyplot
 
         try:
             figure = self.plot()[0].figure  # type: ignore[attr-defined]
-        except (InputError, OSError):
-            return ""
+        except (InputError, OSError):  # of data that cannot be read
+            return table
         png = io.BytesIO()
         figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
         pyplot.close(figure)
-        return f'<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
+        return f'{table}<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 
-def _figure(value: object) -> object:
-    return f"{value:.4g}" if isinstance(value, float) else value
+def _texts(facts: Mapping[str, object]) -> dict[str, str]:
+    return {
+        name: f"{fact:.4g}" if isinstance(fact, float) else str(fact)
+        for name, fact in facts.items()
+        if fact is not None
+    }
 
 
 def times(shape: Sequence[int]) -> str:
@@ -65,11 +63,7 @@ def times(shape: Sequence[int]) -> str:
 
 
 def span(values: np.ndarray) -> str | None:
-    """The range of the values as text; None for an empty array.
-
-    >>> span(np.array([620.0, 540.0, 580.0]))
-    '540 to 620'
-    """
+    """The range of the values as text; None for an empty array."""
     return f"{values.min():g} to {values.max():g}" if values.size else None
 
 

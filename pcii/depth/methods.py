@@ -114,7 +114,7 @@ def _checked(estimate: Callable[..., object], label: str, name: str | None) -> M
     """The method of a function that may do anything: it raises `InputError`, which begins with `label`."""
 
     def method(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
-        found = called(estimate, label, "the data and the range of depths", data, z_range_mm)
+        found = called(estimate, label, data, z_range_mm)
         shape_HW = data.grid.shape_HW
         if not isinstance(found, DepthMap) or found.z_mm.shape != shape_HW:
             raise InputError(f"{label} must return a pcii.DepthMap of {shape_HW[0]} x {shape_HW[1]} pixels")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors
 from pcii.depth.methods import estimate_depth
@@ -53,7 +53,7 @@ def evaluate(
     methods: Sequence[Method] = (),
     budgets: Sequence[float | str] = (),
     z_mm: Sequence[float] = (),
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score methods on datasets and compare them; returns the figures of evaluation.json (`summarise`).
@@ -82,13 +82,15 @@ def evaluate(
     """
     folder = Path(out)
     named = named_functions(methods)
-    if executor != ALONE:
+    if executor != THIS_PROCESS:
         _check_sendable(named)
     tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
     again = measure(EvaluationJob(tasks, folder.resolve()), executor, report)
+    report("pages", 0, 1)
     with all_rows(folder) as rows, named_in_errors(folder):
         result = summarise(rows) | {"again": again}
         write_evaluation(folder, result)
+    report("pages", 1, 1)
     return result
 
 
@@ -114,10 +116,10 @@ def measure(job: "EvaluationJob", executor: Executor, report: Report) -> list[di
     again = _again([tasks[number] for number in remaining], made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
+    if remaining:
+        report("scores", 0, len(remaining))
     with closing(executor.run(job, remaining, report)) as work:
-        for finished, done in enumerate(work, start=1):
-            if done.fault:
-                raise InputError(done.fault)
+        for finished, _ in enumerate(work, start=1):
             report("scores", finished, len(remaining))
     return again
 
@@ -199,17 +201,6 @@ class EvaluationJob:
         """Measure a task and add its row; raises `InputError` for a dataset that is damaged."""
         append_row(self.out, self._measured(self.tasks[piece]))
         return True
-
-    def name(self, piece: int) -> str:
-        """Dataset and method."""
-        task = self.tasks[piece]
-        return f"{task.dataset.path}, {task.method}"
-
-    def use_threads(self, count: int) -> None:
-        """Let compiled loops run on so many threads."""
-        from pcii.base import compiled_loops
-
-        compiled_loops.use_threads(count)
 
     def estimated(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
         """Seconds and result of a task on its `data`; the first call of a method at a budget is a warm-up."""

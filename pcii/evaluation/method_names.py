@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import name_of
+from pcii.base.extensions import load_function, name_of
 from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.removal.methods import removal_methods
 
@@ -60,6 +60,10 @@ def named_functions(methods: Sequence[Method]) -> dict[str, Function | None]:
     """
     found: dict[str, Function | None] = {}
     for method in methods:
+        if isinstance(method, str) and ":" in (estimator_of(method) or method):
+            function = load_function(estimator_of(method) or method)
+            name = name_of(function)
+            method = (name if estimator_of(method) is None else depth_name(name)), function
         if isinstance(method, str):
             check_method(method)
             found.setdefault(method)

@@ -4,17 +4,14 @@ Both are an evaluation (`pcii.evaluation`) with a submission.json beside it, whi
 Photons, frames and full light of a scene are one scene in it, whatever their recipes.
 """
 
-import importlib
 import resource
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pcii.base.command_output import MOST_COMPLAINTS
+from pcii.base.command_line import MOST_COMPLAINTS
 from pcii.base.errors import InputError
-from pcii.base.executor import ALONE, Executor
-from pcii.base.plain_text import visible
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors, write_json_safely
 from pcii.evaluation.benchmark_collection import BenchmarkCollection
@@ -23,9 +20,7 @@ from pcii.evaluation.comparison import measure
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import (
     Function,
-    Method,
     depth_name,
-    estimator_of,
     full_name,
     named_functions,
 )
@@ -47,17 +42,16 @@ def run_method(
     *,
     half: Half = "test",
     budgets: Sequence[float | str] = (),
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score a method on one half of a benchmark, in the folder `out`; the figures of `summarise`.
 
-    `method` is a name, as of `pcii.evaluate`, or "module:function" for a removal of one's own, and
-    "depth:module:function" for depth. Without `budgets` it is scored at all light that there is. Rows that
-    are in the folder already are kept, as by `evaluate`. Raises `InputError` for a method that is not there,
-    for budgets that no dataset has, and as `evaluate` does.
+    `method` is a name, as of `pcii.evaluate`. Without `budgets` it is scored at all light that there is. Rows
+    that are in the folder already are kept, as by `evaluate`. Raises `InputError` for a method that is not
+    there, for budgets that no dataset has, and as `evaluate` does.
     """
-    named = named_functions([_method(method)])
+    named = named_functions([method])
     (name,) = named
     chosen: set[Budget] = {budget_of(each) if isinstance(each, str) else each for each in budgets}
     tasks: list[Task] = []
@@ -83,7 +77,7 @@ def score_submission(
     out: Path,
     *,
     half: Half = "test",
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score the maps in a folder (`submitted_maps`) on one half of a benchmark; the figures of `summarise`.
@@ -143,21 +137,3 @@ def by_scene(rows: Sequence[Row]) -> list[Row]:
 def _takes(name: str, named: Mapping[str, Function | None], light: Budget) -> bool:
     functions = [each for each, function in named.items() if function is not None]
     return full_name(name, full_light=light == FULL_LIGHT, functions=functions) is not None
-
-
-def _method(text: str) -> Method:
-    """A method as it is named on a command line: by its name, or as module:function."""
-    estimator = estimator_of(text)
-    module, colon, function = (text if estimator is None else estimator).partition(":")
-    if not colon:
-        return text
-    if "" not in sys.path:
-        sys.path.insert(0, "")  # modules of the working directory, as `python -m` has them
-    try:
-        found = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as fault:
-        raise InputError(f"method: {text!r} cannot be loaded ({visible(str(fault))})") from None
-    if not callable(found):
-        raise InputError(f"method: {function!r} of {module!r} is no function")
-    name = function if estimator is None else depth_name(function)
-    return name, found

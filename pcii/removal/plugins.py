@@ -32,7 +32,7 @@ def checked(remove: Callable[..., object], label: str, name: str | None = None) 
     """
 
     def method(counts: PhotonCounts, sections: Sections) -> Segmented:
-        result = called(remove, label, "the counts and their sections", counts, sections)
+        result = called(remove, label, counts, sections)
         if not isinstance(result, Segmented):
             raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}")
         requirement = _unmet_requirement(result, name, counts, sections)

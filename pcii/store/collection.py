@@ -31,6 +31,8 @@ COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 """Columns of the table beside the swept fields."""
 COLLECTION = "collection.json"
 INDEX = "index.jsonl"
+LOCK = ".lock"
+"""Locked while a run writes to the folder, and then removed."""
 REMEDY = "the same `simgen generate` command makes it again from the datasets"
 COLLECTION_FOLDER = FolderKind(
     "collection",
@@ -39,6 +41,7 @@ COLLECTION_FOLDER = FolderKind(
     absent=f"not a collection (no {COLLECTION}); make one with `simgen generate`",
     remedy=REMEDY,
     marks=frozenset({COLLECTION}),
+    passing=frozenset({LOCK}),
     has_checksum=True,
 )
 Split = Literal["train", "validation", "test"]

@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pcii.base.command_output import answer_json, say
+from pcii.base.command_line import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, Stages, silent
 from pcii.store.collection import (
     COLLECTION,
     INDEX,
+    LOCK,
     check_manifest,
     is_collection,
     read_collection,
@@ -73,7 +74,7 @@ def _verify_collection(path: Path, report: Report) -> int:
         return 1 + _verify_folder(check_manifest(path, row), silent)
 
     files = _sum_over(rows, check, "datasets", report)
-    listed = {COLLECTION, INDEX, CARD, *(row["path"] for row in rows)}
+    listed = {COLLECTION, INDEX, LOCK, CARD, *(row["path"] for row in rows)}
     unlisted = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
     unfinished = [name for name in unlisted if (path / name / MARKER).is_file()]
     _refuse_unlisted(path, [name for name in unlisted if name not in unfinished], INDEX)

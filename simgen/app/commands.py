@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from pcii.base import command_line
-from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
-from pcii.base.executor import ALONE, Executor
+from pcii.base.command_line import answer, answer_json, complain_of, results_folder, say, say_next
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection import Half
 from simgen.app.scene_commands import (
@@ -86,7 +86,7 @@ def generate(
     seeds: int | None = None,
     scenes: int | None = None,
     trust_python: TrustPython = False,
-    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
 
@@ -130,7 +130,7 @@ def generate(
         faults = generate_sweep(sweep, out, executor, report)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
     if faults:
-        complain_of(faults, "not made: ", " were not made")
+        complain_of(faults, "not made: ")
         return 1
     say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
     return 0
@@ -143,7 +143,7 @@ def make(
     out: Out,
     half: Half | None = None,
     scene: tuple[str, ...] = (),
-    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
 ) -> int:
     """Make the datasets of a benchmark, and compare them with the published ones; run again to resume.
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.exchange.dataset_card import write_card
 from pcii.store.collection import Collection, open_collection
@@ -69,7 +69,7 @@ def generate_collection(
     seeds: int | None = None,
     scenes: int | None = None,
     trust_python: bool = False,
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> Collection:
     """Make all datasets of a recipe whose fields have several values in the folder `out`, and open them.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base.command_output import answer, answer_json, say, say_next
+from pcii.base.command_line import answer, answer_json, say, say_next
 
 Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]

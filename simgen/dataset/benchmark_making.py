@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.executor import ALONE, Executor
+from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.store.benchmark_layout import (
@@ -106,7 +106,7 @@ def make_benchmark(
     *,
     half: Half | None = None,
     names: tuple[str, ...] = (),
-    executor: Executor = ALONE,
+    executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> list[str]:
     """Make the datasets of a benchmark in the folder `out`, or go on with them; faults of those that failed.

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import BusyError, InputError
+from pcii.base.errors import InputError
 from pcii.base.safe_files import locked
 from pcii.store import software
 from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, REMEDY, read_written_manifest
@@ -62,7 +62,7 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark.
 
     If nothing was put into the folder before the block raises, the mark is removed, and what folders were
-    made for it. Raises `BusyError` at once if another process is making the dataset.
+    made for it. Raises `InputError` at once if another process is making the dataset.
     """
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
     marker = out / MARKER
@@ -86,7 +86,7 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
                             folder.rmdir()
                 raise
     except BlockingIOError:
-        raise BusyError(f"{out}: another run is writing this dataset") from None
+        raise InputError(f"{out}: another run is writing this dataset") from None
 
 
 def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:

@@ -100,7 +100,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
     """Make a dataset that is not finished yet; its manifest. See `generate` for what is refused.
 
     What it has in common with those made before with the same `reuse` is not made again. Raises
-    `BusyError` if another process is at it.
+    `InputError` if another process is at it.
     """
     recipe, identity, timings_s = prepared.recipe, prepared.identity, dict[str, float]()
     engine, counting = backend.describe(spectral=recipe.is_spectral), None

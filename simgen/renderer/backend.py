@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.executor import threads_of_worker
 from simgen.base.file_lookup import cached
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
@@ -140,6 +141,10 @@ def _mitsuba() -> Any:
     with _uninterrupted():
         import mitsuba as mi
 
+    if (threads := threads_of_worker()) is not None:
+        import drjit as dr
+
+        dr.set_thread_count(threads)
     return mi
 
 
@@ -167,11 +172,6 @@ def is_scalar(mi: Any) -> bool:
 def is_spectral(mi: Any) -> bool:
     """Whether rays carry wavelengths; else linear sRGB."""
     return "spectral" in mi.variant()
-
-
-def use_threads(count: int) -> None:
-    """Set the number of threads of the compiled backend in this process."""
-    load_drjit().set_thread_count(count)
 
 
 def shape_numbers(scene: Any) -> list[int]:

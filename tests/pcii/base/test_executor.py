@@ -1,4 +1,4 @@
-"""Jobs in several processes: deaths, full disks, pieces of others, Ctrl-C, killed commands, clusters."""
+"""Work in several processes: faults, deaths, Ctrl-C, killed commands, clusters."""
 
 import os
 import signal
@@ -6,102 +6,92 @@ import subprocess
 import sys
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from pcii.base.errors import BusyError, InputError
-from pcii.base.executor import Executor
-from pcii.base.jobs import Done
+from pcii.base.errors import InputError, WorkerLostError
+from pcii.base.executor import Executor, threads_of_worker
 
 
 class Numbers:
-    """Answers each piece by its number; some pieces kill their process, find the disk full, or are busy."""
+    """Answers each piece by its number and what it keeps; some pieces kill their process or are wrong."""
 
     def __init__(self, folder: Path, **pieces: Any) -> None:
-        self.folder, self.pieces, self.threads = folder, pieces, 0
+        self.folder, self.pieces, self.count = folder, pieces, 0
 
-    def __call__(self, piece: int) -> tuple[int, int]:
+    def __call__(self, piece: int) -> tuple[int, int, int | None]:
         with (self.folder / "begun").open("a") as begun:
             begun.write(f"{piece} {os.getpid()}\n")
-        if piece in self.pieces.get("deadly", ()) or self._first_time("deadly_once", piece):
-            os.kill(os.getpid(), signal.SIGSEGV if piece % 2 else signal.SIGKILL)
-        if piece in self.pieces.get("full", ()):
+        if piece == self.pieces.get("deadly"):
+            os.kill(os.getpid(), signal.SIGKILL)
+        if piece == self.pieces.get("full"):
             raise OSError(28, "No space left on device", f"file {piece}")
-        if piece in self.pieces.get("wrong", ()):
+        if piece == self.pieces.get("wrong"):
             raise InputError(f"piece {piece} is wrong")
-        if self._first_time("busy_once", piece):
-            raise BusyError
         time.sleep(self.pieces.get("seconds", 0.02))
-        return piece, self.threads
-
-    def _first_time(self, what: str, piece: int) -> bool:
-        mark = self.folder / f"{what}_{piece}"
-        if piece not in self.pieces.get(what, ()) or mark.exists():
-            return False
-        mark.touch()
-        return True
-
-    def name(self, piece: int) -> str:
-        return f"number {piece}"
-
-    def use_threads(self, count: int) -> None:
-        self.threads = count
+        self.count += 1
+        return piece, self.count, threads_of_worker()
 
     def begun(self) -> list[tuple[int, int]]:
         """Pieces and the processes that began them, in order."""
+        if not (self.folder / "begun").exists():
+            return []
         lines = (self.folder / "begun").read_text().split("\n")[:-1]
         return [(int(piece), int(process)) for piece, process in (line.split() for line in lines)]
 
 
-def done_by(executor: Executor, job: Numbers, count: int) -> dict[int, Done]:
-    done = list(executor.run(job, range(count)))
-    assert len(done) == count
-    return {one.piece: one for one in done}
+def wait_for(condition: Callable[[], object], seconds: float = 120) -> None:
+    until = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
-def test_neighbours_are_done_by_one_process(tmp_path: Path) -> None:
-    job, threads = Numbers(tmp_path), max(1, (os.cpu_count() or 1) // 2)
-    assert done_by(Executor(2), job, 20) == {piece: Done(piece, (piece, threads)) for piece in range(20)}
-    by_process: dict[int, list[int]] = {}
-    for piece, process in job.begun():
-        by_process.setdefault(process, []).append(piece)
-    assert len(by_process) == 2
-    following = sum(after == before + 1 for own in by_process.values() for before, after in pairwise(own))
-    assert following > 10
-    assert Counter(piece for piece, _ in job.begun()) == dict.fromkeys(range(20), 1)
-
-
-def test_a_piece_that_kills_is_tried_once_more_and_harms_no_other(tmp_path: Path) -> None:
-    job = Numbers(tmp_path, deadly={2, 3}, deadly_once={1}, wrong={4})
-    done = done_by(Executor(2), job, 6)
-    how = "2 processes died of it, the last with exit code"
-    assert {piece: one.fault for piece, one in done.items() if one.fault} == {
-        2: f"number 2: {how} {-signal.SIGKILL}",
-        3: f"number 3: {how} {-signal.SIGSEGV}",
-        4: "piece 4 is wrong",
-    }
-    assert all(done[piece].result for piece in (0, 1, 5))
-    assert Counter(piece for piece, _ in job.begun()) == {0: 1, 1: 2, 2: 2, 3: 2, 4: 1, 5: 1}
-
-
-def test_a_full_disk_is_raised_and_ends_the_work(tmp_path: Path) -> None:
-    job = Numbers(tmp_path, full={0, 5})
-    with pytest.raises(OSError, match="No space left on device") as fault:
-        done_by(Executor(2), job, 100)
-    assert fault.value.filename in ("file 0", "file 5")
-    assert len(job.begun()) < 100
+def alive(processes: set[int]) -> set[int]:
+    stats = {process: Path(f"/proc/{process}/stat") for process in processes}
+    return {process for process, stat in stats.items() if stat.exists() and ") Z" not in stat.read_text()}
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_what_others_are_at_is_looked_at_again(tmp_path: Path, workers: int) -> None:
-    job = Numbers(tmp_path, busy_once={0, 1})
-    assert set(done_by(Executor(workers), job, 3)) == {0, 1, 2}
-    assert Counter(piece for piece, _ in job.begun()) == {0: 2, 1: 2, 2: 1}
+def test_each_piece_is_done_once_and_each_process_keeps_its_copy(tmp_path: Path, workers: int) -> None:
+    work = Numbers(tmp_path)
+    results = dict(Executor(workers).run(work, range(20)))
+    assert {piece: result[0] for piece, result in results.items()} == {piece: piece for piece in range(20)}
+    assert sorted(piece for piece, _ in work.begun()) == list(range(20))
+    by_process = [process for _, process in work.begun()]
+    counts = [by_process.count(process) for process in set(by_process)]
+    assert len(counts) <= workers
+    assert sorted(count for _, count, _ in results.values()) == sorted(
+        number + 1 for count in counts for number in range(count)
+    )
+    share = None if workers == 1 else max(1, (os.cpu_count() or 1) // workers)
+    assert {threads for _, _, threads in results.values()} == {share}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize(
+    ("fault", "kind", "sentence"),
+    [("wrong", InputError, "piece 3 is wrong"), ("full", OSError, "No space left on device: 'file 3'")],
+)
+def test_a_fault_of_a_piece_ends_the_work(
+    tmp_path: Path, workers: int, fault: str, kind: type[Exception], sentence: str
+) -> None:
+    work = Numbers(tmp_path, **{fault: 3})
+    with pytest.raises(kind, match=sentence):
+        list(Executor(workers).run(work, range(100)))
+    assert len(work.begun()) < 20
+    assert not alive({process for _, process in work.begun()} - {os.getpid()})
+
+
+def test_a_process_that_dies_ends_the_work_in_one_sentence(tmp_path: Path) -> None:
+    work = Numbers(tmp_path, deadly=3)
+    with pytest.raises(WorkerLostError, match=r"a worker process died.*; what is finished stays"):
+        list(Executor(2).run(work, range(100)))
+    assert len(work.begun()) < 20
+    assert not alive({process for _, process in work.begun()})
 
 
 COMMAND = """
@@ -116,9 +106,9 @@ app = command_line.command_app("numbers", "Numbers.")
 
 @app.command
 def work(folder: Path, scheduler: str | None = None):
-    job, executor = Numbers(folder, seconds=float(sys.argv[-1])), Executor(1 if scheduler else 2, scheduler)
+    work, executor = Numbers(folder, seconds=float(sys.argv[-1])), Executor(1 if scheduler else 2, scheduler)
     with progress.Stages() as report:
-        for count, _ in enumerate(executor.run(job, range(1000), report), start=1):
+        for count, _ in enumerate(executor.run(work, range(1000), report), start=1):
             report("numbers", count, 1000)
 
 if __name__ == "__main__":
@@ -150,48 +140,35 @@ def line_with(text: str, process: subprocess.Popen[str]) -> str:
     assert process.stderr is not None
     end = threading.Timer(120, process.kill)
     end.start()
-    found = next((line for line in process.stderr if text in line), "")
+    next_line = next((line for line in process.stderr if text in line), "")
     end.cancel()
-    return found
-
-
-def alive(processes: set[int]) -> set[int]:
-    stats = {process: Path(f"/proc/{process}/stat") for process in processes}
-    return {process for process, stat in stats.items() if stat.exists() and ") Z" not in stat.read_text()}
+    return next_line
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
 def test_ctrl_c_and_a_kill_end_all_processes_in_the_midst_of_pieces(
     started: Callable[..., subprocess.Popen[str]], tmp_path: Path, ending: signal.Signals
 ) -> None:
-    process, job = started(str(tmp_path / "command.py"), "work", str(tmp_path), "1000"), Numbers(tmp_path)
-    until = time.monotonic() + 120
-    while not (tmp_path / "begun").exists() or len(job.begun()) < 2:
-        assert process.poll() is None
-        assert time.monotonic() < until
-        time.sleep(0.05)
-    workers = {process for _, process in job.begun()}
+    process, work = started(str(tmp_path / "command.py"), "work", str(tmp_path), "1000"), Numbers(tmp_path)
+    wait_for(lambda: len(work.begun()) == 2)
+    workers = {process for _, process in work.begun()}
     assert len(alive(workers)) == 2
     if ending == signal.SIGINT:
         os.killpg(process.pid, ending)  # as a terminal does
     else:
         process.send_signal(ending)
-    _, told = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=10)
     if ending == signal.SIGINT:
         assert process.returncode == 130
-        assert told == "stopped; the same command goes on from here\n"
-    until = time.monotonic() + 30
-    while alive(workers):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+        assert errors == "stopped; the same command goes on from here\n"
+    wait_for(lambda: not alive(workers), 10)
 
 
 def test_ctrl_c_that_another_thread_receives_ends_the_work(tmp_path: Path) -> None:
-    job, ended, ignored = Numbers(tmp_path, seconds=1000), threading.Event(), threading.Event()
+    work, ended, ignored = Numbers(tmp_path, seconds=1000), threading.Event(), threading.Event()
 
     def stop() -> None:
-        while not (tmp_path / "begun").exists() or len(job.begun()) < 2:
-            time.sleep(0.05)
+        wait_for(lambda: len(work.begun()) == 2)
         signal.pthread_kill(threading.get_ident(), signal.SIGINT)
         if not ended.wait(30):
             ignored.set()
@@ -199,7 +176,7 @@ def test_ctrl_c_that_another_thread_receives_ends_the_work(tmp_path: Path) -> No
 
     threading.Thread(target=stop, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
-        done_by(Executor(2), job, 2)
+        list(Executor(2).run(work, range(2)))
     ended.set()
     assert not ignored.is_set()
 
@@ -216,44 +193,43 @@ def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_to
     started("-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1")
     assert line_with("numbers: 1/1000", command)
     scheduler.kill()
-    _, told = command.communicate(timeout=120)
-    lines = [line for line in told.splitlines() if not line.startswith(("numbers", "waiting for a worker"))]
-    assert len(lines) == 1, told
+    _, errors = command.communicate(timeout=120)
+    lines = [line for line in errors.splitlines() if not line.startswith(("numbers", "waiting for a worker"))]
+    assert len(lines) == 1, errors
     assert lines[0].startswith(f"error: {address}: the Dask scheduler has ended")
     assert "the same command goes on" in lines[0]
     assert command.returncode == 1
 
 
-def test_a_cluster_does_a_piece_again_whose_worker_died(tmp_path: Path) -> None:
+def test_a_cluster_does_the_pieces_and_its_loss_ends_the_work(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    options: Any = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.LocalCluster(resources={"renderer": 1}, **options) as cluster:
-        executor = Executor(scheduler=cluster.scheduler_address, resource="renderer")
-        job = Numbers(tmp_path, deadly_once={3}, wrong={4}, busy_once={5})
-        done = done_by(executor, job, 8)
-        assert {piece: one.fault for piece, one in done.items() if one.fault} == {4: "piece 4 is wrong"}
-        assert len({process for _, process in job.begun()}) > 1
+    options: Any = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None, "processes": False}
+    with distributed.LocalCluster(resources={"renderer": 2}, **options) as cluster:
+        executor, work = Executor(scheduler=cluster.scheduler_address, resource="renderer"), Numbers(tmp_path)
+        assert {piece for piece, _ in executor.run(work, range(8))} == set(range(8))
         with pytest.raises(OSError, match="No space left on device"):
-            done_by(executor, Numbers(tmp_path, full={1}), 3)
+            list(executor.run(Numbers(tmp_path, full=1), range(3)))
+        results = executor.run(Numbers(tmp_path, seconds=2.5), range(8))
+        next(results)
+        cluster.scale(0)
+        with pytest.raises(WorkerLostError, match="all workers of the cluster are gone"):
+            list(results)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("pcii.base.dask_cluster.ANSWER_S", 0.5)
+    monkeypatch.setattr("pcii.base.executor.CONNECTION_TIMEOUT_S", 0.5)
     with pytest.raises(InputError, match=r"scheduler: none answers at tcp://127\.0\.0\.1:9"):
+        list(Executor(scheduler="tcp://127.0.0.1:9").run(Numbers(tmp_path), range(2)))
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"scheduler: Dask is not installed; .* pip install '\.\[cluster\]'"):
         list(Executor(scheduler="tcp://127.0.0.1:9").run(Numbers(tmp_path), range(2)))
 
 
-def test_without_dask_processes_work_and_a_scheduler_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    assert set(done_by(Executor(2), Numbers(tmp_path), 2)) == {0, 1}
-    with pytest.raises(InputError, match=r"scheduler: Dask is not installed; .* pip install '\.\[cluster\]'"):
-        done_by(Executor(scheduler="tcp://127.0.0.1:9"), Numbers(tmp_path), 2)
-
-
-def test_executors_that_make_no_sense_are_refused() -> None:
-    for workers, scheduler, resource in ((0, None, None), (2, "tcp://here", None), (1, None, "GPU")):
-        with pytest.raises(InputError):
-            Executor(workers, scheduler, resource)
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [((0,), "workers"), ((2, "tcp://here"), "workers"), ((1, None, "GPU"), "resource")],
+)
+def test_executors_that_make_no_sense_are_refused(arguments: tuple[Any, ...], field: str) -> None:
+    with pytest.raises(InputError, match=f"^{field}: "):
+        Executor(*arguments)

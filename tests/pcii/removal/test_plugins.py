@@ -69,14 +69,6 @@ def writing(counts, sections):
     sections.counts[0] = 0
     return good(counts, sections)
 
-def insisting(counts, sections):
-    sections.counts.base[:] = 0
-    return Segmented(sections.counts[..., 0] > 0, "insisting", sections)
-
-def late(counts, sections):
-    counts.events.n.base[:] = 9
-    return Segmented(sections.counts[..., 0] > 0, "late", sections)
-
 number = 3
 """
 
@@ -118,7 +110,7 @@ def test_an_unknown_method_is_reported_with_those_of_packages(tmp_path, monkeypa
 def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, likelihood="strange_code:good")
     with pytest.raises(
-        InputError, match=r"strange_code:good of the package strange takes the name .*'likelihood'"
+        InputError, match=r"strange_code:good of the package strange needs another name than 'likelihood'"
     ):
         removal_methods()
     assert segment(counts(), 1.0, method="likelihood").method == "likelihood"
@@ -142,11 +134,10 @@ def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
         ("nothing", r"must return a pcii\.Segmented, not NoneType$"),
         ("bare", r"must return a pcii\.Segmented, not ndarray$"),
         ("steps", r"must return maps \(1, 5, 6\) in `steps`, and 'blur' is none$"),
-        ("alone", r"must take the counts and their sections, not \(counts\)$"),
+        ("alone", r"failed: TypeError: alone\(\) takes 1 positional argument but 2 were given$"),
         ("leaving", r"failed: SystemExit: 0$"),
         ("failing", r"failed: AttributeError: 'PhotonCounts' object has no attribute 'colour'$"),
         ("writing", r"failed: ValueError: assignment destination is read-only$"),
-        ("insisting", r"must not write into its input, and has changed Sections: read that anew$"),
     ],
 )
 def test_nonsense_is_reported_in_one_sentence(tmp_path, monkeypatch, name, sentence):
@@ -171,13 +162,6 @@ def test_results_of_wrong_types_are_refused(tmp_path, monkeypatch, name, sentenc
     install(tmp_path, monkeypatch, good="strange_code:good")
     with pytest.raises(InputError, match=sentence):
         segment(counts(), 1.0, method=getattr(import_module("strange_code"), name))
-
-
-def test_what_a_method_computes_from_its_input_and_changes_is_computed_anew(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, late="strange_code:late")
-    seen = counts()
-    segment(seen, 1.0, method="late")
-    assert seen.events.n.sum() == seen.dense.sum()
 
 
 def test_a_package_that_ends_the_program_when_it_is_imported_is_reported(tmp_path, monkeypatch):

@@ -120,7 +120,7 @@ def test_a_name_that_two_packages_register_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install(tmp_path, monkeypatch, {"drawn_room": "strange_scenes:good"})
-    with pytest.raises(InputError, match="are both named 'drawn_room'"):
+    with pytest.raises(InputError, match="needs another name than 'drawn_room'"):
         drawn_scenes()
 
 

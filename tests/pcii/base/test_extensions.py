@@ -1,0 +1,61 @@
+"""Methods that are named as module:function or file.py:function."""
+
+import pickle
+import sys
+from pathlib import Path
+
+import pytest
+from twins import even_light, unit_grid
+
+import pcii
+from pcii.base.errors import InputError
+from pcii.base.extensions import load_function
+from pcii.evaluation.method_names import named_functions
+
+CODE = """
+from pcii import Segmented
+
+def remove(counts, sections):
+    return Segmented(sections.counts[..., 0] > 0, "mine", sections)
+
+number = 3
+"""
+
+
+@pytest.mark.parametrize(
+    "name", ["{folder}/own_removal.py:remove", "own_removal.py:remove", "own_removal:remove"]
+)
+def test_a_function_of_a_file_or_a_module_is_a_method(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "own_removal.py").write_text(CODE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    name = name.format(folder=tmp_path)
+    counts = even_light(unit_grid(2, 2, 5, 6), 0.5, seed=1)
+    assert pcii.segment(counts, 1.0, method=name).method == "mine"
+    function = load_function(name)
+    assert pickle.loads(pickle.dumps(function)) is function
+    assert named_functions([name, f"depth:{name}"]) == {"remove": function, "depth:remove": function}
+    del sys.modules["own_removal"]
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("own_numbers.py:nothing", r"AttributeError: .*nothing"),
+        ("missing.py:remove", "ModuleNotFoundError: .*missing"),
+        ("json.py:dumps", r"a module of the name 'json' is at .*rename the file"),
+        ("own_numbers.py:number", "is int, which cannot be called"),
+    ],
+)
+def test_what_is_no_function_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, sentence: str
+) -> None:
+    for file in ("own_numbers.py", "json.py"):
+        (tmp_path / file).write_text(CODE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    sys.modules.pop("own_numbers", None)
+    with pytest.raises(InputError, match=f"^method: '{name}' .*{sentence}"):
+        load_function(name)
