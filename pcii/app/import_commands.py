@@ -127,7 +127,7 @@ def import_dataset(
     if z_range_mm is not None:
         check_depth_range(z_range_mm)
     if photons is not None:
-        Light.per_view(photons)
+        Light(photons)
     options: dict[str, Any] = {
         "pattern": pattern,
         "grid": grid,

@@ -22,7 +22,7 @@ from pcii.figures.exposure import (
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.demosaicing import demosaic
-from pcii.types.camera_grid import CameraGrid, middle_camera
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import Segmented
 from pcii.types.section_stack import Sections
 from pcii.types.truth import Truth
@@ -191,7 +191,7 @@ def _view_panels(shown: Shown) -> list[Panel]:
     views = shown.outcome.dataset.views
     if views is None:
         return []
-    k, l = middle_camera(views.grid)
+    k, l = views.grid.middle_camera
     name = f"view ({k}, {l}) at full light"
     view = views.view(k, l).astype(np.float64)
     if views.cfa is None:
@@ -216,7 +216,7 @@ def _section_panels(sections: Sections, images: Sequence[np.ndarray], light: str
 def _photon_panel(shown: Shown) -> Panel:
     """The photons of the central view."""
     counts = shown.outcome.dataset.counts
-    k, l = middle_camera(counts.grid)
+    k, l = counts.grid.middle_camera
     view = counts.view(k, l)
     image = photon_picture(view[shown.crop.rows, shown.crop.cols], shown.crop.step_px)
     return _drawing(image, f"view ({k}, {l}) at the photon budget: {view.sum()} photons")

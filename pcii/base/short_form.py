@@ -1,54 +1,28 @@
-"""Short representations of objects that hold large arrays: one line; in notebooks a table and a picture."""
+"""Short representations of objects that hold large arrays, in one line."""
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import in_html, visible
+from pcii.base.plain_text import visible
 
 MAX_LINE_LENGTH = 119
 MAX_LISTED = 4
 """Longer lists are abbreviated to their first and last value and their length."""
-PICTURE_DOTS_PER_INCH = 60
 
 
 class ShortForm:
-    """Gives a dataclass a short `repr`, and a table and its `plot` to notebooks."""
+    """Gives a dataclass a short `repr`."""
 
     def _facts(self) -> Mapping[str, object]:
         """Names and values of what distinguishes this object, most important first; None is left out."""
         return vars(self)
 
-    def _known_facts(self) -> dict[str, object]:
-        return {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
-
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in self._known_facts().items())
+        known = {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
+        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in known.items())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
-
-    def _repr_html_(self) -> str:
-        facts = self._known_facts().items()
-        rows = "".join(f"<tr><td>{in_html(name)}</td><td>{in_html(fact)}</td></tr>" for name, fact in facts)
-        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>{self._picture_html()}"
-
-    def _picture_html(self) -> str:
-        """What `plot` draws as an image in HTML; empty without `plot`, and for data that cannot be read."""
-        if not hasattr(self, "plot"):
-            return ""
-        from matplotlib import pyplot
-
-        try:
-            figure = self.plot()[0].figure  # type: ignore[attr-defined]
-        except (InputError, OSError):
-            return ""
-        png = io.BytesIO()
-        figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
-        pyplot.close(figure)
-        return f'<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 
 def _figure(value: object) -> object:

@@ -15,7 +15,7 @@ from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views, in_binary_unit
+from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
 
@@ -44,8 +44,6 @@ def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) 
     from scipy.ndimage import uniform_filter
 
     is_counted = isinstance(data, PhotonCounts)
-    if isinstance(data, Views):
-        data = in_binary_unit(data)
 
     def evenness(sections: Sections, plane: int) -> np.ndarray:
         assert sections.variance is not None

@@ -1,14 +1,13 @@
 """Pictures of plain arrays: 8-bit images, and what Matplotlib draws for `.plot()` and notebooks.
 
-Nothing here knows a type. The types of `core` know what of themselves is worth a picture, and hand over
-arrays with their captions; so this room comes before `core`, and all imports can be read in the source, which
-a table of functions registered by later rooms would hide.
+Functions take plain arrays; one module knows by the name of a type what of it is worth a picture.
 
 Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it is given, or else into a new figure of
 `pyplot`, and returns them as an array (N,), one for each panel; it takes them as a list, one panel's alone
 too. Matplotlib is imported on the first picture.
 
 charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
+drawn_types   What each type shows of itself: `.plot()` of all, and their page in notebooks.
 exposure      What of an image is shown, and how bright: blocks, smoothed photons, means, a common
               exposure.
 maps          Maps over pixels with a scale: depth, entropy.

@@ -16,7 +16,7 @@ from pcii.base.errors import InputError
 from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
 from pcii.types.arrays import LARGEST_COUNT, is_whole
 from pcii.types.bayer import colour_cells
-from pcii.types.focal_planes import FocalPlanes, check_data, planes_at
+from pcii.types.focal_planes import FocalPlanes, check_data
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_events import PLAIN
@@ -69,7 +69,7 @@ def reconstruct(
     [[0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
     """
     _check(data, subpixel, shifts)
-    grid, planes, sample_variance = data.grid, planes_at(data.grid, z_mm), None
+    grid, planes, sample_variance = data.grid, FocalPlanes.at_depths(data.grid, z_mm), None
     cfa, channels = colours_apart(data, shifts)
     shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
     rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
@@ -104,7 +104,7 @@ def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -
     [1.0, 1.0]
     """
     check_data(data)
-    planes = planes_at(data.grid, z_mm)
+    planes = FocalPlanes.at_depths(data.grid, z_mm)
     for plane in range(len(planes)):
         yield reconstruct(data, planes.take([plane]), **options)
 

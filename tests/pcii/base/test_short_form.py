@@ -1,4 +1,4 @@
-"""What values say of themselves: a line, and for notebooks a table and a picture."""
+"""What values say of themselves: a line, and for notebooks a picture."""
 
 import base64
 import io
@@ -43,7 +43,7 @@ def values(tmp_path: Path) -> list[tuple[object, str]]:
             dataset,
             "Dataset(name=data, shape=2 x 2 x 8 x 12, budgets=[20, 50], z_mm=[1, 2], has=[counts, truth])",
         ),
-        (counts, "PhotonCounts(shape=2 x 2 x 8 x 12, photons=121, storage=events)"),
+        (counts, "PhotonCounts(shape=2 x 2 x 8 x 12, cfa=mono, photons=121, storage=events)"),
         (dense, "PhotonCounts(shape=2 x 2 x 8 x 12, cfa=RGGB, photons=384, storage=dense)"),
         (counts.events, "PhotonEvents(events=111, photons=121)"),
         (truth, "Truth(shape=8 x 12, z_mm=1 to 2, objects=[near, far])"),
@@ -57,10 +57,7 @@ def values(tmp_path: Path) -> list[tuple[object, str]]:
 
 def test_each_value_says_what_it_is_in_a_line(values: list[tuple[object, str]]) -> None:
     assert [repr(value) for value, _ in values] == [line for _, line in values]
-    for value, line in values:
-        page = value._repr_html_()  # type: ignore[attr-defined]
-        assert page.startswith("<table><caption>")
-        assert len(line) < 120
+    assert all(len(line) < 120 for _, line in values)
 
 
 @pytest.mark.filterwarnings("ignore:Glyph")
@@ -70,8 +67,8 @@ def test_names_of_strangers_show_as_text_on_one_line() -> None:
         truth = Truth(np.ones(shape), np.ones(shape, dtype=int), {1: name})
         assert len(repr(truth)) < 120
         assert visible(repr(truth)) == repr(truth)
-        table, _, picture = truth._repr_html_().partition("<img ")
-        assert set(re.findall("</?([^>]*)>", table)) <= {"table", "caption", "tr", "td"}
+        text, _, picture = truth._repr_html_().partition("<img ")
+        assert re.findall("</?([^>]*)>", text) == ["pre", "pre"]
         assert re.fullmatch('src="[a-zA-Z0-9/+=:;,]*">', picture)
 
 
@@ -91,9 +88,8 @@ def test_notebooks_show_what_plot_draws(values: list[tuple[object, str]]) -> Non
     from matplotlib import pyplot
 
     for value, _ in values:
-        pages = value._repr_html_().split('<img src="data:image/png;base64,')  # type: ignore[attr-defined]
-        assert len(pages) == 1 + hasattr(value, "plot")
-        for page in pages[1:]:
+        if hasattr(value, "_repr_html_"):
+            _, page = value._repr_html_().split('<img src="data:image/png;base64,')  # type: ignore[attr-defined]
             Image.open(io.BytesIO(base64.b64decode(page.removesuffix('">')))).verify()
     assert not pyplot.get_fignums()
     views = Views(np.full((1, 2, 8, 12, 1), np.nan), unit_grid(1, 2, 8, 12))
@@ -102,8 +98,6 @@ def test_notebooks_show_what_plot_draws(values: list[tuple[object, str]]) -> Non
 
 def test_a_grid_and_a_posterior_say_what_they_are() -> None:
     grid = unit_grid(2, 3, 8, 12, pitch_mm=(10.0, 5.0))
-    page = grid._repr_html_()
-    assert "<td>pitch_mm</td><td>(10.0, 5.0)</td>" in page
     assert repr(grid).startswith("CameraGrid(rows=2, cols=3, ")  # as it is made
     planes = FocalPlanes.at_depths(grid, [1.0, 2.0])
     posterior = DepthPosterior(planes, np.zeros((2, 4, 6), np.float32), np.ones((4, 6), np.float32), 2)

@@ -241,7 +241,7 @@ def test_pictures_are_drawn_into_given_axes() -> None:
     [
         (lambda counts: counts.plot(axes="left"), "axes: expected Matplotlib axes, got str"),
         (lambda counts: pcii.reconstruct(counts, Z_MM).plot(counts.plot()), "axes: 2 panels are drawn"),
-        (lambda counts: counts.plot(view=(3, 0)), r"view: there is no camera \(3, 0\)"),
+        (lambda counts: counts.plot(view=(3, 0)), r"view: expected a camera \(k, l\) of 3 x 3, got \(3, 0\)"),
         (lambda counts: counts.plot(view="middle"), "view: expected a camera"),
         (lambda counts: counts.plot(view=(0, 0.5)), "view: expected a camera"),
     ],
