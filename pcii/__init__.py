@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
@@ -17,6 +18,7 @@ from pcii.exchange.hci_scenes import import_hci
 from pcii.exchange.image_folders import Optics, ViewOrder, import_images
 from pcii.exchange.lens_arrays import LensArray, import_lens_array
 from pcii.metrics.scoring import score
+from pcii.metrics.true_masks import TrueFocus
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.demosaicing import demosaic
@@ -25,8 +27,10 @@ from pcii.store.collection import Collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.sample_dataset import sample
+from pcii.store.verification import verify
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
+from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
@@ -39,6 +43,7 @@ __all__ = [
     "Dataset",
     "DepthMap",
     "DepthPosterior",
+    "FocalPlanes",
     "InputError",
     "LensArray",
     "Optics",
@@ -47,6 +52,7 @@ __all__ = [
     "Sections",
     "Segmented",
     "ThreeStep",
+    "TrueFocus",
     "Truth",
     "ViewOrder",
     "Views",
@@ -63,8 +69,10 @@ __all__ = [
     "import_images",
     "import_lens_array",
     "limit_photons",
+    "mean_interval",
     "open_collection",
     "open_dataset",
+    "paired_difference",
     "reconstruct",
     "reconstruct_each",
     "removal_methods",
@@ -73,4 +81,5 @@ __all__ = [
     "score",
     "segment",
     "srgb_to_linear",
+    "verify",
 ]
