@@ -36,6 +36,11 @@ CONDITIONS = {
 SCENES = {f"simgen.spec.{name}" for name in ("scene", "lights", "materials", "shapes")}
 NO_NUMBERS = {
     "Collection": "a table of datasets",
+    "FocalPlanes": "checked as `z_mm` of `reconstruct` is",
+    "TrueFocus": "made of a `Truth`",
+    "mean_interval": "means of scores",
+    "paired_difference": "means of scores",
+    "verify": "reads a folder",
     "InputError": "the refusal itself",
     "ViewOrder": "four switches",
     "depth_methods": "names",
@@ -71,7 +76,6 @@ OPTIONS: dict[str, Options] = {
     "": {},
     ", variance": {"variance": True},
     ", subpixel 2": {"subpixel": 2},
-    ", subpixel 2, variance": {"subpixel": 2, "variance": True},
 }
 TEXT = """# Numerical limits
 
@@ -107,8 +111,8 @@ stress`.
 A refusal is a `pcii.InputError`, one sentence that names the argument or the file: NaN and infinity; light
 below 0 where photons are drawn from it; fractions of photons; depths not above 0, and those so near that
 views shift by more than 2^31 px; more than 10^12 photons expected of a view by `limit_photons`; radiance so
-large that a sum is no number of its type, and, for variances, so large or so faint that squares of
-differences are none (above 10^19 or below 10^−19 in float32, 10^154 and 10^−154 in float64).
+large that a sum is no number of its type, and, for variances, so large that squares of
+differences are none (above 10^19 in float32, 10^154 in float64).
 
 ## What each function gives
 

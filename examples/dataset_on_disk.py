@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pcii
 import simgen
-from pcii.store.verification import verify
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/example")
 recipe = simgen.load_recipe("small", ["photons.nested=[1000]", "products.radiance=none"])
@@ -15,4 +14,4 @@ print(f"{manifest['photons']['total']} photons by {manifest['photons']['method']
 dataset = pcii.open_dataset(folder)
 print(dataset)
 print(dataset.at_budget(1000).counts)
-print(f"{verify(folder)} files are as they were written")
+print(f"{pcii.verify(folder)} files are as they were written")

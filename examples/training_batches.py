@@ -13,8 +13,6 @@ import numpy as np
 
 import pcii
 import simgen
-from pcii.metrics.true_masks import TrueFocus
-from pcii.types.focal_planes import FocalPlanes
 
 
 def examples(
@@ -25,9 +23,9 @@ def examples(
         dataset = collection[int(number)]
         truth, planes = dataset.truth, dataset.analysis["z_mm"]
         assert truth is not None
-        z_mm = float(rng.choice(planes))
-        section = pcii.reconstruct(dataset.counts, z_mm=[z_mm])
-        in_focus = TrueFocus(FocalPlanes.at_depths(dataset.grid, z_mm), truth).by_pixel[0]
+        plane = pcii.FocalPlanes.at_depths(dataset.grid, rng.choice(planes))
+        section = pcii.reconstruct(dataset.counts, plane)
+        in_focus = pcii.TrueFocus(plane, truth).by_pixel[0]
         yield np.moveaxis(section.counts[0], -1, 0).astype(np.float32), in_focus
 
 

@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
@@ -17,6 +18,7 @@ from pcii.exchange.hci_scenes import import_hci
 from pcii.exchange.image_folders import LensArray, import_images, import_lens_array
 from pcii.exchange.stated_cameras import Optics, ViewOrder
 from pcii.metrics.scoring import score
+from pcii.metrics.true_masks import TrueFocus
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.demosaicing import demosaic
@@ -24,8 +26,10 @@ from pcii.sections.reconstruction import reconstruct, reconstruct_each
 from pcii.store.collection import Collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset, sample
 from pcii.store.dataset_writer import save_dataset
+from pcii.store.verification import verify
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
+from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
@@ -38,6 +42,7 @@ __all__ = [
     "Dataset",
     "DepthMap",
     "DepthPosterior",
+    "FocalPlanes",
     "InputError",
     "LensArray",
     "Optics",
@@ -46,6 +51,7 @@ __all__ = [
     "Sections",
     "Segmented",
     "ThreeStep",
+    "TrueFocus",
     "Truth",
     "ViewOrder",
     "Views",
@@ -62,8 +68,10 @@ __all__ = [
     "import_images",
     "import_lens_array",
     "limit_photons",
+    "mean_interval",
     "open_collection",
     "open_dataset",
+    "paired_difference",
     "reconstruct",
     "reconstruct_each",
     "removal_methods",
@@ -72,4 +80,5 @@ __all__ = [
     "score",
     "segment",
     "srgb_to_linear",
+    "verify",
 ]

@@ -10,8 +10,7 @@ plain_text        Display of text from untrusted files: markup is escaped, invis
                   visible.
 progress          Progress of long work, compilation included: bars on a terminal, plain lines in a log.
 safe_files        Atomic writing of files and folders: whatever has its final name is complete.
-short_form        Short representations of objects that hold large arrays: one line; in notebooks a table
-                  and pictures.
+short_form        Short representations of objects that hold large arrays, in one line.
 srgb              sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values,
                   luminance.
 """

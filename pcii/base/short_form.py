@@ -1,56 +1,32 @@
-"""Short representations of objects that hold large arrays: one line; in notebooks a table and a picture."""
+"""Short representations of objects that hold large arrays, in one line."""
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import in_html, visible
+from pcii.base.plain_text import visible
 
 MAX_LINE_LENGTH = 119
 MAX_LISTED = 4
 """Longer lists are abbreviated to their first and last value and their length."""
-PICTURE_DOTS_PER_INCH = 60
 
 
 class ShortForm:
-    """Gives a dataclass a short `repr`, and a table and its `plot` to notebooks."""
+    """Gives a dataclass a short `repr`."""
 
     def _facts(self) -> Mapping[str, object]:
         """Names and values of what distinguishes this object, most important first; None is left out."""
         return vars(self)
 
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name}={visible(text)}" for name, text in _texts(self._facts()).items())
+        known = {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
+        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in known.items())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
 
-    def _repr_html_(self) -> str:
-        facts = _texts(self._facts()).items()
-        rows = "".join(f"<tr><td>{in_html(name)}</td><td>{in_html(text)}</td></tr>" for name, text in facts)
-        table = f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
-        if not hasattr(self, "plot"):
-            return table
-        from matplotlib import pyplot
 
-        try:
-            figure = self.plot()[0].figure  # type: ignore[attr-defined]
-        except (InputError, OSError):  # of data that cannot be read
-            return table
-        png = io.BytesIO()
-        figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
-        pyplot.close(figure)
-        return f'{table}<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
-
-
-def _texts(facts: Mapping[str, object]) -> dict[str, str]:
-    return {
-        name: f"{fact:.4g}" if isinstance(fact, float) else str(fact)
-        for name, fact in facts.items()
-        if fact is not None
-    }
+def _figure(value: object) -> object:
+    return f"{value:.4g}" if isinstance(value, float) else value
 
 
 def times(shape: Sequence[int]) -> str:
@@ -63,7 +39,11 @@ def times(shape: Sequence[int]) -> str:
 
 
 def span(values: np.ndarray) -> str | None:
-    """The range of the values as text; None for an empty array."""
+    """The range of the values as text; None for an empty array.
+
+    >>> span(np.array([620.0, 540.0, 580.0]))
+    '540 to 620'
+    """
     return f"{values.min():g} to {values.max():g}" if values.size else None
 
 

@@ -30,13 +30,13 @@ Method = Callable[..., DepthMap]
 FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
     "focus": focus_depth,
-    "likelihood-sweep": "pcii.baselines.plane_sweeps:likelihood_sweep",
-    "variance-sweep": "pcii.baselines.plane_sweeps:variance_sweep",
+    "likelihood-sweep": "pcii.baselines.textbook_depth:likelihood_sweep",
+    "variance-sweep": "pcii.baselines.textbook_depth:variance_sweep",
 }
 FOR_VIEWS: dict[str, Method | str] = {
     "posterior": FOR_COUNTS["posterior"],
     "variance-sweep": FOR_COUNTS["variance-sweep"],
-    "structure-tensor": "pcii.baselines.epipolar_slopes:structure_tensor",
+    "structure-tensor": "pcii.baselines.textbook_depth:structure_tensor",
 }
 """The built-in methods by what they take; those to compare with are loaded when they are asked for."""
 DEFAULT_METHOD = "posterior"

@@ -1,7 +1,7 @@
 """Every drawing: 8-bit pictures of arrays, and what Matplotlib draws for `.plot()`, pages and notebooks.
 
-Nothing here knows a type. The types know what of themselves is worth a picture, and hand over arrays with
-their captions; so this room comes before `types`.
+Functions take plain arrays; one module knows by the name of a type what of it is worth a picture. So this
+room comes before `types`.
 
 Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or else into a new figure of
 `pyplot`, and returns them as an array (N,), one for each panel. It takes them as a list, one panel's alone
@@ -12,5 +12,6 @@ charts     Charts of scores: bars of shares, reliability of confidence, accuracy
 exposure   How photons become an image: blocks, smoothing, means, one exposure for several images.
 panels     Axes to draw in, pictures and maps over the pixels of a view, colour bars, the style for print.
 pictures   Light, masks, depth and errors as 8-bit sRGB, and their files.
-plots      What `.plot()` of each type but the score draws.
+drawn_types What each type shows of itself: `.plot()` of all, and their page in notebooks.
+plots      What `.plot()` of each type draws, of plain arrays.
 """

@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus, intersection_over_union
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import Segmented
 from pcii.types.geometry import blur_half_extent_px, parallax_px, total_disparity_px
 from pcii.types.section_stack import Sections
 from pcii.types.truth import Truth
@@ -24,21 +22,6 @@ times as large."""
 AWAY_FROM_EDGES_PX = 4
 """Three standard deviations of the smoothing, one pixel of blur and one of the difference: no edge is
 included."""
-
-
-def oracle(sections: Sections, truth: Truth, *, kind: Kind = "pixel") -> Segmented:
-    """In-focus masks (Z, H, W) of a method that knows each pixel's true depth and nothing else.
-
-    A pixel belongs to the plane of `sections` that is nearest in disparity. For the truth by "pixel" it
-    is claimed there if its blur half-extent is at most the tolerance of that truth, 1 px; for the truth
-    by "object", which has no tolerance, if it shows an object. Raises `InputError` for another kind, or
-    if shapes differ.
-    """
-    if kind not in ("object", "pixel"):
-        raise InputError(f"kind: use 'object' or 'pixel', not {kind!r}")
-    if sections.counts.shape[1:3] != truth.z_mm.shape:
-        raise InputError(f"truth: its maps are {truth.z_mm.shape}, the sections {sections.counts.shape[1:3]}")
-    return Segmented(TrueFocus(sections.planes, truth).oracle(kind), "oracle", sections)
 
 
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
@@ -97,11 +80,12 @@ def log_gradient_squared(
 
 
 def plane_bounds(true: TrueFocus) -> dict[tuple[int, Kind], float]:
-    """IoU of `oracle` at each plane, by the plane's number and kind of truth."""
+    """IoU of `TrueFocus.oracle` at each plane, by the plane's number and kind of truth."""
+    oracle = {kind: true.oracle(kind) for kind in KINDS}
     return {
-        (plane, kind): intersection_over_union(claimed, mask)
+        (plane, kind): intersection_over_union(oracle[kind][plane], true.masks(kind)[plane])
+        for plane in range(len(true.planes))
         for kind in KINDS
-        for plane, (claimed, mask) in enumerate(zip(true.oracle(kind), true.masks(kind), strict=True))
     }
 
 

@@ -29,21 +29,7 @@ MEASURES = (
 HCI_BORDER_PX = 15
 """Border that the benchmark ignores."""
 BADPIX = {"badpix_001": 0.01, "badpix_003": 0.03, "badpix_007": 0.07}
-HCI_MEASURES = (
-    *BADPIX,
-    "mse_x100",
-    "q25_x100",
-    "discontinuities",
-    "fine_fattening",
-    "fine_thinning",
-    "answered",
-)
-DISCONTINUITY_BADPIX = 0.07
-FINE_STEP_PX = 0.15
-"""Disparity by which fine structures differ from their surroundings; a larger jump is an edge."""
-FINE_WIDTH_PX = 11
-"""Structures into which no square of this side fits are fine."""
-NEAR_EDGE_PX = 5
+HCI_MEASURES = (*BADPIX, "mse_x100", "q25_x100", "answered")
 CORRECT_PX = 1.0
 """Error in px of total disparity up to which a depth is what its confidence is the probability of."""
 CONFIDENCE_BINS = 10
@@ -94,10 +80,8 @@ def hci_errors(grid: CameraGrid, depth: DepthMap, truth: Truth, where: np.ndarra
     """Metrics of the HCI 4D light field benchmark over the pixels `where`, bool (H, W).
 
     Honauer et al. 2016, 2017. `badpix_*`: share with |e| > t; `mse_x100`: 100 mean e^2; `q25_x100`: 100
-    times the lower quartile of |e|; `discontinuities`: badpix at 0.07 px near edges of the true depth;
-    `fine_fattening`: share around fine structures with e < -0.15; `fine_thinning`: share of them with
-    e > 0.15; `answered`: share with an estimate. The benchmark's regions are drawn by hand; here they are
-    `near_edges` and `fine_structures`. A border of 15 px is ignored. None where no pixel is left.
+    times the lower quartile of |e|; `answered`: share with an estimate. A border of 15 px is ignored. None
+    where no pixel is left.
     """
     errors: dict[str, float | None] = dict.fromkeys(HCI_MEASURES)
     judged = np.zeros(where.shape, dtype=bool)
@@ -109,13 +93,8 @@ def hci_errors(grid: CameraGrid, depth: DepthMap, truth: Truth, where: np.ndarra
     true = _disparity_px(grid, truth.z_mm)
     error = true - _disparity_px(grid, np.where(missing, np.inf, depth.z_mm))
     known = np.abs(error[judged & ~missing])
-    fine = fine_structures(true)
     for key, threshold in BADPIX.items():
         errors[key] = _mean((np.abs(error) > threshold) | missing, judged)
-    wrong = (np.abs(error) > DISCONTINUITY_BADPIX) | missing
-    errors["discontinuities"] = _mean(wrong, judged & near_edges(true))
-    errors["fine_fattening"] = _mean((error < -FINE_STEP_PX) | missing, judged & _near(fine) & ~fine)
-    errors["fine_thinning"] = _mean((error > FINE_STEP_PX) | missing, judged & fine)
     errors["answered"] = _mean(~missing, judged)
     if known.size:
         errors["mse_x100"] = float(100 * np.mean(known**2))
@@ -164,32 +143,6 @@ def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, An
         name = f"{ends[0]:.1f}-{ends[1]:.1f}"
         reliability[name] = {"share": share, "confidence": confidence, "correct": right}
     return {"ece": ece, "reliability": reliability}
-
-
-def near_edges(disparity: np.ndarray) -> np.ndarray:
-    """Pixels (H, W) bool within 5 px of a jump of the disparity by more than 0.15 px between neighbours."""
-    jump = np.zeros(disparity.shape, dtype=bool)
-    for lines, jumps in ((disparity, jump), (disparity.T, jump.T)):
-        differs = np.abs(np.diff(lines, axis=0)) > FINE_STEP_PX
-        jumps[1:] |= differs
-        jumps[:-1] |= differs
-    return _near(jump)
-
-
-def fine_structures(disparity: np.ndarray) -> np.ndarray:
-    """Pixels (H, W) bool whose disparity exceeds its opening by a square of 11 px by more than 0.15 px.
-
-    The difference is the white top-hat: narrow structures in front of their surroundings.
-    """
-    from scipy.ndimage import grey_opening
-
-    return disparity - grey_opening(disparity, size=(FINE_WIDTH_PX, FINE_WIDTH_PX)) > FINE_STEP_PX
-
-
-def _near(mask: np.ndarray) -> np.ndarray:
-    from scipy.ndimage import maximum_filter
-
-    return maximum_filter(mask, 2 * NEAR_EDGE_PX + 1)
 
 
 def _answered(z_mm: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Scores of masks, depth and entropies against the truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -72,54 +72,40 @@ def score(
                 raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {estimate.shape}")
         if depth is not None and grid is None:
             raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
-    # Methods usually share their sections: what follows from these and the truth alone is computed once.
-    compared = {id(each.sections): each.sections for each in methods}
-    references = {key: _reference(sections, truth) for key, sections in compared.items()}
-    pairs = [(each, references[id(each.sections)]) for each in methods]
+    rows: list[dict[str, Any]] = []
     bounds: dict[str, Any] = {"planes": [], "objects": []}
     objects: list[dict[str, Any]] = []
+    # Methods usually share their sections: what follows from these and the truth alone is computed once.
+    for sections in {id(each.sections): each.sections for each in methods}.values():
+        pooled = pooled_estimate(sections, section_window_px(sections))
+        true = None if truth is None else TrueFocus(sections.planes, truth)
+        oracle_iou = {} if true is None else plane_bounds(true)
+        if truth is not None and sections is methods[0].sections:
+            objects = _object_rows(sections, pooled, truth)
+        for each in methods:
+            if each.sections is sections:
+                rows += _plane_rows(each, pooled, true)
+                for (plane, kind), iou in oracle_iou.items():
+                    row = {"z_mm": float(each.z_mm[plane]), "method": each.method, "truth": kind}
+                    bounds["planes"].append({**row, "iou_oracle": iou})
     if truth is not None:
-        if methods:
-            objects = _object_rows(methods[0], pairs[0][1].pooled, truth)
-        bounds["planes"] = [row for pair in pairs for row in _oracle_rows(*pair)]
         bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    rows = tuple(row for pair in pairs for row in _plane_rows(*pair))
     readout = asdict(methods[0].sections.readout) if methods else None
-    return Score(rows, tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
+    return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
 
-class _Reference(NamedTuple):
-    """What masks of sections are compared with."""
-
-    pooled: np.ndarray
-    """Pooled estimates (Z, H, W, C) of the sections."""
-    true: TrueFocus | None
-    oracle_iou: Mapping[tuple[int, Kind], float]
-
-
-def _reference(sections: Sections, truth: Truth | None) -> _Reference:
-    true = None if truth is None else TrueFocus(sections.planes, truth)
-    pooled = pooled_estimate(sections, section_window_px(sections))
-    return _Reference(pooled, true, {} if true is None else plane_bounds(true))
-
-
-def _plane_rows(focus: Segmented, reference: _Reference) -> list[dict[str, Any]]:
-    before, after = _section_entropies(focus, reference.pooled)
-    true = reference.true
-    names: dict[int, list[str]] = {}
-    if true is not None:
-        for number, plane in true.plane_of.items():
-            names.setdefault(plane, []).append(true.truth.names[number])
+def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) -> list[dict[str, Any]]:
+    before, after = _section_entropies(focus, pooled)
     rows: list[dict[str, Any]] = []
     for plane, depth in enumerate(focus.z_mm):
         photons = photon_agreement(focus, true, plane)
         for kind in KINDS:
-            objects = ", ".join(names.get(plane, [])) if kind == "object" else ""
+            names = [] if true is None or kind == "pixel" else true.names_at(plane)
             rows.append(
                 {
                     "z_mm": float(depth),
                     "method": focus.method,
-                    "object": objects or None,
+                    "object": ", ".join(names) or None,
                     "truth": kind,
                     **_plane_agreement(focus.in_focus[plane], true, plane, kind),
                     **photons[kind],
@@ -129,16 +115,6 @@ def _plane_rows(focus: Segmented, reference: _Reference) -> list[dict[str, Any]]
                 }
             )
     return rows
-
-
-def _oracle_rows(focus: Segmented, reference: _Reference) -> list[dict[str, Any]]:
-    """For each row of a method's planes the IoU of `bounds.oracle`."""
-    iou = reference.oracle_iou
-    return [
-        {"z_mm": float(z), "method": focus.method, "truth": kind, "iou_oracle": iou[plane, kind]}
-        for plane, z in enumerate(focus.z_mm)
-        for kind in KINDS
-    ]
 
 
 def _plane_agreement(
@@ -163,14 +139,14 @@ def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float
     return before, after
 
 
-def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
+def _object_rows(sections: Sections, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
     maxima = pooled.max(axis=1).max(axis=(0, 1))
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):
-        region = entropy_region(focus.sections.grid, truth, number, focus.z_mm)
-        entropy: dict[str, float | None] = {f"{z:g}": None for z in focus.z_mm}
+        region = entropy_region(sections.grid, truth, number, sections.z_mm)
+        entropy: dict[str, float | None] = {f"{z:g}": None for z in sections.z_mm}
         if region.any():
-            for z, plane in zip(focus.z_mm, pooled, strict=True):
+            for z, plane in zip(sections.z_mm, pooled, strict=True):
                 entropy[f"{z:g}"] = region_entropy_bits(plane, region, maxima)
         rows.append({"name": name, "entropy": entropy})
     return rows

@@ -42,6 +42,10 @@ class TrueFocus:
                 plane_of[number] = int(np.argmin(blur))
         return plane_of
 
+    def names_at(self, plane: int) -> list[str]:
+        """Names of the objects that belong to a plane."""
+        return [self.truth.names[number] for number, own in self.plane_of.items() if own == plane]
+
     @cached_property
     def by_object(self) -> np.ndarray:
         """Truth by object: (Z, H, W) bool, the pixels of the objects that belong to each plane."""
@@ -60,7 +64,11 @@ class TrueFocus:
         return self.by_object if kind == "object" else self.by_pixel
 
     def oracle(self, kind: Kind) -> np.ndarray:
-        """Masks (Z, H, W) of a method that knows each pixel's depth and nothing else: see `bounds.oracle`."""
+        """Masks (Z, H, W) of a method that knows each pixel's true depth and nothing else.
+
+        A pixel belongs to the plane that is nearest in disparity. For the truth by "pixel" it is claimed
+        there if it is in focus; for the truth by "object", which has no tolerance, if it shows an object.
+        """
         nearest = self._blur_px.argmin(axis=0) == np.arange(len(self.planes))[:, None, None]
         return nearest & (self.truth.object_id > 0 if kind == "object" else self.by_pixel)
 

@@ -2,9 +2,8 @@
 
 demosaicing        Demosaicing of Bayer images: the gradient-based interpolation of Laroche and Prescott,
                    and three others.
-dense_kernels      Compiled loops over whole images: sums, squared deviations, demosaicing.
 dense_sections     Sections of dense images: whole rows of every view added to whole rows of the section.
-event_kernels      Compiled loops over photons: sections, and samples of windows.
+kernels            Compiled loops: sums of images and of photons, squared deviations, samples, demosaicing.
 photon_statistics  Statistics of photon counts: pooled samples, entropy, the variance of Poisson noise,
                    and saturation.
 reconstruction     Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.

@@ -50,12 +50,12 @@ def demosaic(
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
-    from pcii.sections import dense_kernels
+    from pcii.sections import kernels
 
     cells = colour_cells(cfa).astype(np.int64)
     green, image = np.empty(raw.shape), np.empty((*raw.shape, 3))
-    dense_kernels.interpolate_green(green, raw, cells)
-    dense_kernels.interpolate_chroma(image, green, raw, cells)
+    kernels.interpolate_green(green, raw, cells)
+    kernels.interpolate_chroma(image, green, raw, cells)
     return image
 
 

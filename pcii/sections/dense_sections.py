@@ -33,24 +33,24 @@ def sum_views(
     A view is read once, however many planes. A voxel below two samples has the variance 0.
     Raises `InputError` for radiance that is NaN or infinite, or whose sums or variances would be.
     """
-    from pcii.sections import dense_kernels
+    from pcii.sections import kernels
 
     kind, images = _dtype(data), _in_memory(data)
     running = (_RunningSums(data, focal_planes.take([p]), shifts, variance) for p in range(len(focal_planes)))
     if images is not None:  # plane by plane, so that the running sums of one are in memory
-        _check_finite(data, all(dense_kernels.are_finite(images)))
+        _check_finite(data, all(kernels.are_finite(images)))
         sections = [sums.add(np.arange(len(images)), images).merged(kind) for sums in running]
     else:
         planes = list(running)
         for views, batch in _batches(data):
-            _check_finite(data, all(dense_kernels.are_finite(batch)))
+            _check_finite(data, all(kernels.are_finite(batch)))
             for plane in planes:
                 plane.add(views, batch)
         sections = [plane.merged(kind) for plane in planes]
     sums = _stacked([sums for sums, _ in sections])
     variances = [variance for _, variance in sections if variance is not None]
     _check_finite(data, all(np.isfinite(part).all() for part in (sums, *variances)))
-    return sums, _not_faint(data, _stacked(variances)) if variance else None
+    return sums, _stacked(variances) if variance else None
 
 
 def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) -> np.ndarray:
@@ -66,33 +66,22 @@ def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) ->
     return _stacked([sums.add(np.arange(len(images)), images).merged(np.int64)[0] for sums in running])
 
 
-def sum_fine(
-    data: Views, rows: np.ndarray, cols: np.ndarray, coverage: np.ndarray, *, variance: bool
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """Sums and unbiased variances (Z, H M, W M, C), float64, of radiance on finer voxels.
+def sum_fine(data: Views, rows: np.ndarray, cols: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Sums (Z, H M, W M, C), float64, of radiance on finer voxels.
 
-    `rows` (Z, K, H) and `cols` (Z, L, W) are `FocalPlanes.voxel_indices`; `coverage` is (Z, H M, W M, C).
-    A view is read once, however many planes. Raises `InputError` for radiance that is NaN or infinite, or
-    whose sums or variances would be.
+    `rows` (Z, K, H) and `cols` (Z, L, W) are `FocalPlanes.voxel_indices`, which send no two pixels of a view
+    to the same voxel. A view is read once, however many planes. Raises `InputError` for radiance that is NaN
+    or infinite, or whose sums would be.
     """
-    from pcii.sections import dense_kernels
+    from pcii.sections import kernels
 
-    grid, cells = data.grid, np.zeros((0, 2), np.int64) if data.cfa is None else colour_cells(data.cfa)
-    total = np.zeros(coverage.shape)
-    squares = np.zeros(coverage.shape if variance else (len(rows), 0, 0, 0))
-    first = np.full(squares.shape, np.nan)
-    for k, l in np.ndindex(grid.rows, grid.cols):
+    total, cells = np.zeros(shape), np.zeros((0, 2), np.int64) if data.cfa is None else colour_cells(data.cfa)
+    for k, l in np.ndindex(data.grid.rows, data.grid.cols):
         image = data.view(k, l).astype(np.float64)
-        for p, running in enumerate(zip(total, squares, first, strict=True)):
-            dense_kernels.add_fine(*running, image, rows[p, k], cols[p, l], cells)
-    sums, sample_variance = total, None
-    if variance:
-        with np.errstate(over="ignore", invalid="ignore"):
-            deviations = np.maximum(squares - total * (total / np.maximum(coverage, 1)), 0)
-            sums = np.where(coverage > 0, total + first * coverage, 0)
-        sample_variance = _not_faint(data, deviations / np.maximum(coverage.astype(np.int64) - 1, 1))
-    _check_finite(data, all(np.isfinite(part).all() for part in (sums, squares)))
-    return sums, sample_variance
+        for section, row_of, col_of in zip(total, rows[:, k], cols[:, l], strict=True):
+            kernels.add_fine(section, image, row_of, col_of, cells)
+    _check_finite(data, bool(np.isfinite(total).all()))
+    return total
 
 
 def _stacked(planes: list[np.ndarray]) -> np.ndarray:
@@ -101,7 +90,7 @@ def _stacked(planes: list[np.ndarray]) -> np.ndarray:
 
 
 class _RunningSums:
-    """The section at one plane while views are added: total, squares and first samples of `dense_kernels`."""
+    """The section at one plane while views are added: total, squares and first samples of `kernels`."""
 
     def __init__(
         self, data: Views | PhotonCounts, plane: FocalPlanes, shifts: Shifts, variance: bool
@@ -120,7 +109,7 @@ class _RunningSums:
 
         Group 2 p + q of mosaics has the views whose row and column shifts have the parities p and q.
         """
-        from pcii.sections import dense_kernels
+        from pcii.sections import kernels
 
         down, right = self.row_px[views // self.grid.cols], self.col_px[views % self.grid.cols]
         group = np.zeros_like(down) if self.cells is None else 2 * (down % 2) + right % 2
@@ -130,7 +119,7 @@ class _RunningSums:
         channels = self.colours if self.cells is None else 1
         moves = order, down[order], right[order] * channels, ends
         total, squares, first = self.sums if len(self.sums) == 3 else (self.sums[0], None, None)
-        dense_kernels.add_views(total, squares, first, images, moves)
+        kernels.add_views(total, squares, first, images, moves)
         return self
 
     def merged(self, kind: Any) -> tuple[np.ndarray, np.ndarray | None]:
@@ -225,23 +214,6 @@ def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
             batch, ahead = ahead.result(), reader.submit(read, views)
             yield batch
         yield ahead.result()
-
-
-def _not_faint(data: Views, variance: np.ndarray) -> np.ndarray:
-    """The variance; raises `InputError` if no difference in the data has a square that its type can hold."""
-    least = float(np.finfo(variance.dtype).tiny)
-    if variance.size and variance.max() >= least:
-        return variance
-    grid = data.grid
-    views = (data.view(k, l) for k, l in np.ndindex(grid.rows, grid.cols))
-    lowest, highest = np.array([(view.min(), view.max()) for view in views], dtype=np.float64).T
-    most = float(highest.max()) - float(lowest.min())
-    if 0 < most < np.sqrt(least):
-        raise InputError(
-            f"radiance: differences of at most {most:.2g} are too small for their variance to be a number of "
-            f"{variance.dtype}; multiply all values by a constant"
-        )
-    return variance
 
 
 def _check_finite(data: Views, is_finite: bool) -> None:

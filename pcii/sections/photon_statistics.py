@@ -160,7 +160,7 @@ def view_samples(
     of their squares times the number of views is below 2^53.
     """
     from pcii.base.compiled_loops import threads
-    from pcii.sections import event_kernels as kernels
+    from pcii.sections import kernels
 
     grid, events = counts.grid, counts.events
     row, col, inside = planes.project(events, plane)

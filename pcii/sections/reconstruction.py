@@ -16,7 +16,7 @@ from pcii.base.errors import InputError
 from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
 from pcii.types.arrays import LARGEST_COUNT, is_whole
 from pcii.types.bayer import colour_cells
-from pcii.types.focal_planes import FocalPlanes, check_data, planes_at
+from pcii.types.focal_planes import FocalPlanes, check_data
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_events import PLAIN
@@ -50,8 +50,7 @@ def reconstruct(
     move by the nearest even number of pixels, up to 1 px off instead of 1/2.
 
     Raises `InputError` for a depth not above 0, a subpixel division below 1, options that do not go together,
-    radiance that is not finite, too large to be added up or too faint for a variance, and counts too large
-    for their exact variance.
+    radiance that is not finite or too large to be added up, and counts too large for their exact variance.
 
     Three cameras count a photon each of a point at 500 mm, where the disparity is 10 px:
 
@@ -68,8 +67,8 @@ def reconstruct(
     >>> sections.counts[:, 0, 5:16, 0].tolist()
     [[0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
     """
-    _check(data, subpixel, shifts)
-    grid, planes, sample_variance = data.grid, planes_at(data.grid, z_mm), None
+    _check(data, subpixel, shifts, variance)
+    grid, planes, sample_variance = data.grid, FocalPlanes.at_depths(data.grid, z_mm), None
     cfa, channels = colours_apart(data, shifts)
     shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
     rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
@@ -82,7 +81,7 @@ def reconstruct(
         if variance:
             sample_variance = _count_variance(data, sums, coverage_of(), rows, cols)
     elif subpixel > 1:
-        sums, sample_variance = sum_fine(data, rows, cols, coverage_of(), variance=variance)
+        sums = sum_fine(data, rows, cols, shape)
     else:
         sums, sample_variance = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
@@ -104,7 +103,7 @@ def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -
     [1.0, 1.0]
     """
     check_data(data)
-    planes = planes_at(data.grid, z_mm)
+    planes = FocalPlanes.at_depths(data.grid, z_mm)
     for plane in range(len(planes)):
         yield reconstruct(data, planes.take([plane]), **options)
 
@@ -146,7 +145,7 @@ def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sec
     return Sections(planes, counts_of_all, coverage, readout=counts.readout)
 
 
-def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts) -> None:
+def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts, variance: bool) -> None:
     check_data(data)
     if not is_whole(subpixel) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
@@ -154,6 +153,8 @@ def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts) -> None:
         raise InputError(f"shifts: use 'nearest' or 'even', not {shifts!r}")
     if shifts != "nearest" and subpixel > 1:
         raise InputError(f"shifts: {shifts!r} is for whole pixels (subpixel = 1)")
+    if variance and subpixel > 1 and isinstance(data, Views):
+        raise InputError("variance: that of radiance is for whole pixels (subpixel = 1)")
     if shifts == "even" and data.cfa is None:
         raise InputError("shifts: 'even' is for Bayer mosaics; these data have no pattern (cfa)")
 
@@ -172,7 +173,7 @@ def _scatter(
     cols: np.ndarray,
 ) -> np.ndarray:
     """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
-    from pcii.sections import event_kernels as kernels
+    from pcii.sections import kernels
 
     events = data.events
     # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.

@@ -1,7 +1,7 @@
 """Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes.
 
 array_labels   What every stored array is: the names of its axes, its meaning and its unit.
-arrays         Checks of arrays that all types share.
+arrays         What all types share: checks of arrays, and how a value is drawn.
 bayer          Bayer colour filter arrays: which colour each pixel records.
 camera_grid    The grid of cameras: positions and intrinsic parameters.
 estimates      Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy.
@@ -10,7 +10,7 @@ geometry       Geometry of parallel cameras: the image of a point, disparity and
 images         Elemental images: the radiance of every view.
 photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack.
 photon_events  Photons as events, and the frames of an exposure in which a pixel counts them.
-photon_limit   Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
+photon_limit   The light of a dataset, and photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.

@@ -1,21 +1,59 @@
-"""Checks of arrays that all types share.
+"""What all types share: checks of arrays, and how a value is drawn.
 
 Axes, always in this order: (K, L, H, W, C) for views, (Z, H, W, C) for sections; C is R, G, B.
 Lengths are millimetres and carry `_mm`; `z` is planar depth from the camera plane, never ray length.
 """
 
-from typing import TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
 
 LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
-LARGEST_TOTAL = (1 << 63) - 1
-"""Most photons of all pixels, which 64 bits hold."""
 MOST_DEPTHS = 10_000
 """Longer lists, typed or stored, are rejected as errors: no stack has so many sections."""
+
+
+class Drawn(ShortForm):
+    """A type that `pcii.figures.drawn_types` draws: `plot` in axes, and a picture in notebooks."""
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, **options: Any) -> np.ndarray:
+        """Draw into Matplotlib `axes`, one for each panel, and return them as an array (N,).
+
+        They are by default those of a new figure. What is drawn, and with what options:
+
+        | of | picture | options |
+        |---|---|---|
+        | `CameraGrid` | where the cameras stand, in mm | |
+        | `PhotonCounts` | the photons of a camera, or of all | `view`: (k, l), or "mean" |
+        | `Views` | one elemental image | `view`: (k, l) |
+        | `Sections`, `Segmented` | a panel a section, with outlines of the masks; 12 at most | `style` |
+        | `DepthMap` | depth, grey without an answer | `z_range_mm`: (near, far) of the scale; `style` |
+        | `Truth` | depth, and the objects | `z_range_mm` |
+        | `DepthPosterior` | entropy, or the probability of depths | `pixel`: (row, column) |
+
+        All sections have the same exposure: the 98th percentile of what is lit is white. For print,
+        `style="paper"` has a white background and a scale bar, in mm at the depth of a section:
+        `sections.plot(style="paper")[0].figure.savefig("sections.pdf")`, or .svg.
+
+        Raises `InputError` for what are no axes, another number of them, and no camera or pixel of the view.
+        """
+        from pcii.figures.drawn_types import draw
+
+        return draw(self, axes, **options)
+
+    def _repr_html_(self) -> str:
+        from pcii.figures.drawn_types import picture_html
+
+        return picture_html(self)
 
 
 def is_whole(value: object) -> TypeGuard[int]:
@@ -28,12 +66,6 @@ def read_only(array: np.ndarray) -> np.ndarray:
     view = array.view()
     view.flags.writeable = False
     return view
-
-
-def check_unmasked(name: str, values: object) -> None:
-    """Raise `InputError` for a masked array of which anything is masked: it would be taken for a number."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise InputError(f"{name}: masked values have no number; give an array without a mask")
 
 
 def check_z_mm(z_mm: object) -> np.ndarray:
@@ -56,19 +88,11 @@ def check_z_mm(z_mm: object) -> np.ndarray:
     return z
 
 
-def check_total(name: str, counts: np.ndarray) -> None:
-    """Raise `InputError` if whole numbers, each below 2^63, add up to more than int64 holds."""
-    if counts.size == 0 or counts.size * int(counts.max()) <= LARGEST_TOTAL:
-        return
-    wide, half = counts.astype(np.uint64), np.uint64(32)
-    total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
-    if total > LARGEST_TOTAL:
-        raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")
-
-
 def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
-    """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
-    check_unmasked(name, values)
+    """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`.
+
+    The largest count is 2^40, and the sum of all is below 2^63, which 64 bits hold.
+    """
     array = np.asarray(values)
     kind = array.dtype.kind
     if kind not in "iubf" or (kind == "f" and not (np.isfinite(array) & (array == np.floor(array))).all()):
@@ -77,5 +101,7 @@ def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
         raise InputError(f"{name}: photon counts must not be negative")
     if array.size and float(array.max()) > LARGEST_COUNT:
         raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
+    if array.size * LARGEST_COUNT >= 1 << 63 and array.sum(dtype=np.float64) >= 2.0**63:
+        raise InputError(f"{name}: 2^63 photons in all, or more, cannot be summed exactly")
     integers = {"f": np.dtype(np.int64), "b": np.dtype(np.uint8)}
     return array.astype(integers.get(kind, array.dtype.newbyteorder("=")), copy=False)

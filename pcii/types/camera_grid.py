@@ -1,17 +1,13 @@
 """The grid of cameras: positions and intrinsic parameters."""
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeGuard
+from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm
-from pcii.types.arrays import is_whole
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from pcii.types.arrays import Drawn, is_whole
 
 
 def _is_finite(value: object) -> TypeGuard[float]:
@@ -20,7 +16,7 @@ def _is_finite(value: object) -> TypeGuard[float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraGrid(ShortForm):
+class CameraGrid(Drawn):
     """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
 
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
@@ -92,69 +88,12 @@ class CameraGrid(ShortForm):
         """Shape (H, W) of one view, and of a section."""
         return (self.height, self.width)
 
-    def plot(self, axes: "Axes | None" = None) -> np.ndarray:
-        """Draw where the cameras stand, in mm, with both baselines; return the Matplotlib axes (1,).
+    @property
+    def middle_camera(self) -> tuple[int, int]:
+        """The camera (k, l) in the middle, of an even number the one after it."""
+        return self.rows // 2, self.cols // 2
 
-        `axes` are by default those of a new figure. Raises `InputError` if they are no Matplotlib axes.
-        """
-        from pcii.figures.plots import plot_cameras
-
-        return plot_cameras(axes, self.rows, self.cols, self.pitch_mm)
-
-
-def middle_camera(grid: CameraGrid) -> tuple[int, int]:
-    """The camera (k, l) in the middle, of an even number the one after it."""
-    return grid.rows // 2, grid.cols // 2
-
-
-def check_camera(grid: CameraGrid, view: object) -> tuple[int, int]:
-    """The camera (k, l) of `view`; raises `InputError` for anything but a camera of the grid."""
-    if not (isinstance(view, tuple | list) and len(view) == 2 and all(map(is_whole, view))):
-        raise InputError(f"view: expected a camera (k, l), got {view!r}")
-    k, l = map(int, view)
-    if not (0 <= k < grid.rows and 0 <= l < grid.cols):
-        raise InputError(f"view: there is no camera ({k}, {l}) in a grid of {grid.rows} x {grid.cols}")
-    return k, l
-
-
-def chosen_cameras(grid: CameraGrid, cameras: object) -> tuple[range, range]:
-    """Rows and columns of the cameras that an index [k, l] chooses, each by a number or a slice.
-
-    Raises `InputError` for another index, a camera outside the grid, none, or a step that is not above 0.
-    """
-    if not (isinstance(cameras, tuple) and len(cameras) == 2):
-        raise InputError(f"cameras: expected two numbers or slices [k, l], got {cameras!r}")
-    return _range_of("k", cameras[0], grid.rows), _range_of("l", cameras[1], grid.cols)
-
-
-def _range_of(name: str, index: object, count: int) -> range:
-    if isinstance(index, slice):
-        cameras = range(count)[index]
-        if cameras.step < 1 or not cameras:
-            raise InputError(f"{name}: a slice must choose cameras of 0 .. {count - 1} in their order")
-        return cameras
-    if not is_whole(index) or not -count <= index < count:
-        raise InputError(f"{name}: expected a camera of 0 .. {count - 1}, or a slice, got {index!r}")
-    return range(count)[index : index + 1 or None]
-
-
-def grid_of(grid: CameraGrid, rows: range, cols: range) -> CameraGrid:
-    """The grid of some rows and columns of cameras, whose own centre is its virtual centre.
-
-    Raises `InputError` if the grid is sheared and they do not lie symmetrically in it: their images would
-    have to move.
-    """
-    for name, cameras, count, shear_px in (
-        ("k", rows, grid.rows, grid.shear_px[1]),
-        ("l", cols, grid.cols, grid.shear_px[0]),
-    ):
-        if shear_px and cameras[0] + cameras[-1] != count - 1:
-            raise InputError(f"{name}: cameras of a sheared grid must lie symmetrically around its middle")
-    (pitch_x, pitch_y), (shear_x, shear_y) = grid.pitch_mm, grid.shear_px
-    return replace(
-        grid,
-        rows=len(rows),
-        cols=len(cols),
-        pitch_mm=(pitch_x * cols.step, pitch_y * rows.step),
-        shear_px=(shear_x * cols.step, shear_y * rows.step),
-    )
+    def check_camera(self, k: object, l: object) -> None:
+        """Raise `InputError` for anything but a camera (k, l) of the grid."""
+        if not (is_whole(k) and is_whole(l) and 0 <= k < self.rows and 0 <= l < self.cols):
+            raise InputError(f"view: expected a camera (k, l) of {self.rows} x {self.cols}, got ({k}, {l})")

@@ -1,25 +1,20 @@
 """Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.types.arrays import is_whole, read_only
+from pcii.types.arrays import Drawn, read_only
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.section_stack import Sections
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from pcii.figures.panels import Style
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segmented(ShortForm):
+class Segmented(Drawn):
     """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
 
     `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
@@ -62,23 +57,9 @@ class Segmented(ShortForm):
         """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
         return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
 
-    def plot(
-        self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, *, style: "Style" = "screen"
-    ) -> np.ndarray:
-        """Draw each section after removal with the outline of its mask, and return the Matplotlib axes (N,).
-
-        Panels, exposure, `axes` and `style` are those of `Sections.plot`.
-        """
-        from pcii.figures.plots import plot_sections
-
-        own = self.sections
-        px_at_1mm = own.grid.pixel_mm / own.grid.focal_mm
-        masks, shape_HW = self.in_focus, own.grid.shape_HW
-        return plot_sections(axes, self.z_mm, own.in_colours, shape_HW, px_at_1mm, style, masks, self.method)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthMap(ShortForm):
+class DepthMap(Drawn):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
     `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
@@ -103,26 +84,9 @@ class DepthMap(ShortForm):
         share = f"{answered.size / max(1, self.z_mm.size):.2%}"
         return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
 
-    def plot(
-        self,
-        axes: "Axes | None" = None,
-        *,
-        z_range_mm: tuple[float, float] | None = None,
-        style: "Style" = "screen",
-    ) -> np.ndarray:
-        """Draw depth in mm with a colour bar, and return the Matplotlib axes (1,).
-
-        Colours are paler where less sure, grey without an answer. The scale spans `z_range_mm`, (near, far),
-        by default all but outlying depths. `axes` are by default those of a new figure. `style="paper"` is
-        for print, with a scale bar in px. Raises `InputError` for what is no Matplotlib axes or style.
-        """
-        from pcii.figures.plots import plot_depth
-
-        return plot_depth(axes, self.z_mm, self.confidence, z_range_mm, style=style)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthPosterior(ShortForm):
+class DepthPosterior(Drawn):
     """What is known of the depth of blocks of `block_px` x `block_px` pixels of the virtual centre camera.
 
     `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
@@ -153,25 +117,6 @@ class DepthPosterior(ShortForm):
         outcomes = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
         logarithm = np.log2(outcomes, out=np.zeros(outcomes.shape), where=outcomes > 0)
         return np.maximum(-(outcomes * logarithm).sum(axis=0), 0)
-
-    def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> np.ndarray:
-        """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
-
-        The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
-        Matplotlib axes (1,), by default of a new figure. Raises `InputError` for a pixel outside the view.
-        """
-        from pcii.figures.plots import plot_entropy, plot_probability
-
-        shape_HW = self.planes.grid.shape_HW
-        if pixel is None:
-            return plot_entropy(axes, self.entropy_bits(), len(self.planes), shape_HW, self.block_px)
-        is_inside = isinstance(pixel, tuple | list) and len(pixel) == 2 and all(map(is_whole, pixel))
-        if not is_inside or not all(0 <= n < size for n, size in zip(pixel, shape_HW, strict=True)):
-            raise InputError(f"pixel: expected (row, column) in a view of {times(shape_HW)}, got {pixel!r}")
-        i, j = pixel
-        a, b = i // self.block_px, j // self.block_px
-        probability, no_surface = self.probability[:, a, b], self.no_surface[a, b]
-        return plot_probability(axes, self.planes.z_mm, probability, no_surface, (i, j))
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.

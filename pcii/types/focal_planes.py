@@ -1,7 +1,7 @@
 """Focal planes: the depths of sections, and by how much the views shift for each.
 
-Depths are validated and converted to disparities and shifts once, here; functions that make or read sections
-take the planes. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
+Public functions take depths as numbers or planes and pass planes on: depths are checked and converted to
+disparities and shifts once, here. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,9 @@ class FocalPlanes(ShortForm):
 
     @classmethod
     def at_depths(cls, grid: CameraGrid, z_mm: object) -> "FocalPlanes":
-        """Planes at the planar depths `z_mm`, one number or a list of them.
+        """Planes at the planar depths `z_mm`: one number, a list of them, or planes, which are returned.
+
+        Raises `InputError` for an invalid depth, and for planes of another grid.
 
         >>> grid = CameraGrid(
         ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
@@ -61,6 +63,10 @@ class FocalPlanes(ShortForm):
         >>> FocalPlanes.at_depths(grid, [500, 1000]).whole_shifts_px[1].tolist()
         [[-10, 0, 10], [-5, 0, 5]]
         """
+        if isinstance(z_mm, FocalPlanes):
+            if z_mm.grid != grid:
+                raise InputError("z_mm: these focal planes are of another camera grid")
+            return z_mm
         z = check_z_mm(z_mm)
         return cls(grid, z, total_disparity_px(grid, z))
 
@@ -153,18 +159,6 @@ class FocalPlanes(ShortForm):
         return row, col, (row >= 0) & (row < height) & (col >= 0) & (col < width)
 
 
-def planes_at(grid: CameraGrid, z_mm: object) -> FocalPlanes:
-    """Planes of `grid` at the depths `z_mm`; `FocalPlanes` are returned as they are.
-
-    Raises `InputError` for an invalid depth, or for planes of another grid.
-    """
-    if not isinstance(z_mm, FocalPlanes):
-        return FocalPlanes.at_depths(grid, z_mm)
-    if z_mm.grid != grid:
-        raise InputError("z_mm: these focal planes are of another camera grid")
-    return z_mm
-
-
 def check_data(data: object) -> None:
     """Raise `InputError` unless sections can be made of `data`: `PhotonCounts` or `Views`."""
     if not isinstance(data, PhotonCounts | Views):
@@ -174,11 +168,8 @@ def check_data(data: object) -> None:
 
 def check_depth_counts(counts: object) -> None:
     """Raise `InputError` unless `counts` are `PhotonCounts` of at least two views, which depth needs."""
-    if isinstance(counts, Views):
-        remedy = "draw them with pcii.limit_photons, or import with --photons N"
-        raise InputError(f"counts: needs photon counts, and these are images; {remedy}")
     if not isinstance(counts, PhotonCounts):
-        expected = "PhotonCounts (of a dataset its .counts)"
+        expected = "PhotonCounts (of a dataset its .counts, of Views pcii.limit_photons)"
         raise InputError(f"counts: expected {expected}, got {type(counts).__name__}")
     if counts.grid.view_count < 2:
         raise InputError("counts: one view has no depth; at least 2 cameras are needed")

@@ -10,25 +10,18 @@ import numpy as np
 from pcii.types.camera_grid import CameraGrid
 
 
-def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:
-    """(X, Y) of camera (k, l) in the plane Z = 0; the virtual centre is ((K-1)/2, (L-1)/2)."""
-    x = (l - (grid.cols - 1) / 2) * grid.pitch_mm[0]
-    y = (k - (grid.rows - 1) / 2) * grid.pitch_mm[1]
-    return x, y
-
-
 def project_px(
-    grid: CameraGrid,
-    point_mm: tuple[float, float, float],
-    k: float,
-    l: float,
+    grid: CameraGrid, point_mm: tuple[float, float, float], k: float, l: float
 ) -> tuple[float, float]:
-    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers."""
+    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers.
+
+    The virtual centre is the camera ((K-1)/2, (L-1)/2).
+    """
     X, Y, Z = point_mm
-    x_camera, y_camera = camera_position_mm(grid, k, l)
-    scale_px = grid.focal_mm / grid.pixel_mm
-    i = (grid.height - 1) / 2 + (k - (grid.rows - 1) / 2) * grid.shear_px[1] + scale_px * (Y - y_camera) / Z
-    j = (grid.width - 1) / 2 + (l - (grid.cols - 1) / 2) * grid.shear_px[0] + scale_px * (X - x_camera) / Z
+    down, right = k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2
+    scale_px = grid.focal_mm / grid.pixel_mm / Z
+    i = (grid.height - 1) / 2 + down * grid.shear_px[1] + scale_px * (Y - down * grid.pitch_mm[1])
+    j = (grid.width - 1) / 2 + right * grid.shear_px[0] + scale_px * (X - right * grid.pitch_mm[0])
     return i, j
 
 

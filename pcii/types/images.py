@@ -1,18 +1,15 @@
 """Elemental images: the radiance of every view."""
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
-from pcii.types.arrays import check_unmasked, read_only
+from pcii.base.short_form import times
+from pcii.types.arrays import Drawn, read_only
 from pcii.types.bayer import check_cfa, colours_and_samples
-from pcii.types.camera_grid import CameraGrid, check_camera, middle_camera
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from pcii.types.camera_grid import CameraGrid
 
 
 class ArrayLike5D(Protocol):
@@ -25,7 +22,7 @@ class ArrayLike5D(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Views(ShortForm):
+class Views(Drawn):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel
@@ -56,10 +53,8 @@ class Views(ShortForm):
             dtype = self.radiance.dtype
             if dtype.kind not in "fiu":
                 raise InputError(f"radiance: expected real numbers, got {dtype}")
-            check_unmasked("radiance", self.radiance)
             if dtype.newbyteorder("=") in (np.uint8, np.uint16):
-                remedy = "decode it by pcii.srgb_to_linear, or give linear values as float32"
-                raise InputError(f"radiance: {dtype} of pictures is sRGB, not light; {remedy}")
+                raise InputError(f"radiance: {dtype} is sRGB of pictures; decode it by pcii.srgb_to_linear")
             object.__setattr__(self, "radiance", read_only(self.radiance))
 
     def _facts(self) -> dict[str, object]:
@@ -70,45 +65,17 @@ class Views(ShortForm):
         """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
 
-    def plot(self, axes: "Axes | None" = None, *, view: tuple[int, int] | None = None) -> np.ndarray:
-        """Draw the elemental image of the camera `view`, (k, l), in colours; return the Matplotlib axes (1,).
-
-        The default is the camera in the middle. The 98th percentile of what is lit is white. A mosaic's
-        pixels take the colours that they lack from those around. `axes` are by default those of a new figure.
-        Raises `InputError` for a camera outside the grid, or NaN or infinity.
-        """
-        from pcii.figures.plots import plot_view
-
-        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
-        return plot_view(axes, colours_and_samples(self.view(k, l), self.cfa), f"view ({k}, {l})")
+    def in_colours(self, k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
+        """Light and numbers of samples of camera (k, l), (H, W, C) each, in the colours of the pixels."""
+        return colours_and_samples(self.view(k, l), self.cfa)
 
     def view(self, k: int, l: int) -> np.ndarray:
-        """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""
+        """Image (H, W, C) of camera (k, l); `InputError` for no camera of the grid, NaN or infinity."""
+        self.grid.check_camera(k, l)
         image = np.asarray(self.radiance[k, l])
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
         return image
-
-
-@dataclass(frozen=True)
-class _Scaled:
-    """Radiance divided by `scale`, one view at a time."""
-
-    radiance: ArrayLike5D
-    scale: float
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.radiance.shape
-
-    def __getitem__(self, index: Any, /) -> np.ndarray:
-        return np.asarray(self.radiance[index], dtype=np.float64) / self.scale
-
-
-def in_binary_unit(views: Views) -> Views:
-    """The same views in the unit `binary_scale`, in double precision where that is not 1."""
-    scale = binary_scale(views)
-    return views if scale == 1 else replace(views, radiance=_Scaled(views.radiance, scale))
 
 
 def binary_scale(views: Views) -> float:
@@ -117,6 +84,6 @@ def binary_scale(views: Views) -> float:
     Methods whose result does not depend on the unit of radiance divide by it, which is exact, so that squares
     neither overflow nor vanish.
     """
-    middle = views.view(views.grid.rows // 2, views.grid.cols // 2)
+    middle = views.view(*views.grid.middle_camera)
     exponent = int(np.frexp(max(abs(float(middle.max())), abs(float(middle.min()))))[1])
     return 1.0 if abs(exponent) <= 20 else 2.0 ** min(exponent, 1023)

@@ -3,15 +3,14 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
-from pcii.types.arrays import check_total, read_only, whole_counts
+from pcii.base.short_form import times
+from pcii.types.arrays import Drawn, read_only, whole_counts
 from pcii.types.bayer import channel_count, check_cfa, colour_cells, colours_and_samples
-from pcii.types.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of, middle_camera
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_events import (
     PLAIN,
     FrameEvents,
@@ -23,12 +22,9 @@ from pcii.types.photon_events import (
     sorted_frames,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhotonCounts(ShortForm):
+class PhotonCounts(Drawn):
     """Photon counts of every elemental image, as sparse events or as a dense stack, without ground truth.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the
@@ -68,7 +64,6 @@ class PhotonCounts(ShortForm):
         counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
-        check_total("counts", counts)
         readout = Readout(frames, bits)
         readout.check(counts)
         own = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
@@ -108,7 +103,6 @@ class PhotonCounts(ShortForm):
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*pixels, photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
-        check_total("n", photons)
         readout = Readout(frames, bits)
         events = sorted_events(pixels, photons, grid)
         whole_counts("n", events.n)  # after those of one pixel are added up
@@ -120,7 +114,7 @@ class PhotonCounts(ShortForm):
     def _facts(self) -> dict[str, object]:
         return {
             "shape": times(self.grid.shape_KLHW),
-            "cfa": self.cfa,
+            "cfa": self.cfa or "mono",
             "photons": self.total,
             "frames": None if self.readout.is_plain else self.readout.frames,
             "bits": self.readout.bits,
@@ -181,7 +175,7 @@ class PhotonCounts(ShortForm):
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l); raises `InputError` for a camera outside the grid."""
-        check_camera(self.grid, (k, l))
+        self.grid.check_camera(k, l)
         if self._dense is not None:
             return self._dense[k, l]
         events = self.events
@@ -190,32 +184,6 @@ class PhotonCounts(ShortForm):
         of_view = slice(self.view_starts[number], self.view_starts[number + 1])
         image[events.i[of_view], events.j[of_view]] = events.n[of_view]
         return image
-
-    @overload
-    def __getitem__(self, cameras: tuple[int, int]) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, cameras: tuple[slice, int | slice] | tuple[int, slice]) -> "PhotonCounts": ...
-    def __getitem__(self, cameras: tuple[int | slice, int | slice]) -> "np.ndarray | PhotonCounts":
-        """Dense counts (H, W) of one camera, `counts[k, l]`, or `PhotonCounts` of some, `counts[1:4, ::2]`.
-
-        A number below 0 counts from the end; beside a slice a number chooses one row (column) of cameras. The
-        chosen cameras have their own virtual centre, which depth and truth of the whole grid share only if
-        they lie symmetrically in it. Raises `InputError` for cameras that are none or in another order, and
-        in a sheared grid for cameras that do not lie symmetrically.
-        """
-        rows, cols = chosen_cameras(self.grid, cameras)
-        if not any(isinstance(index, slice) for index in cameras):
-            return self.view(rows[0], cols[0])
-        grid = grid_of(self.grid, rows, cols)
-        if self._dense is not None:
-            dense = self._dense[rows.start : rows.stop : rows.step, cols.start : cols.stop : cols.step]
-            return PhotonCounts(grid, self.cfa, _dense=dense, readout=self.readout)
-        e = self.events
-        inside = np.isin(e.k, rows) & np.isin(e.l, cols)
-        k, l = (e.k[inside] - rows.start) // rows.step, (e.l[inside] - cols.start) // cols.step
-        events = events_of((k, l, e.i[inside], e.j[inside]), e.n[inside])
-        frame = None if self.frame is None else read_only(self.frame[inside.repeat(e.n)])
-        return PhotonCounts(grid, self.cfa, _events=events, readout=self.readout, frame=frame)
 
     @cached_property
     def total(self) -> int:
@@ -229,24 +197,11 @@ class PhotonCounts(ShortForm):
         """Number of colours of sections of these counts: 3, or 1 for monochrome."""
         return channel_count(self.cfa)
 
-    def plot(
-        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
-    ) -> np.ndarray:
-        """Draw the photons of the camera `view`, (k, l), and return the Matplotlib axes (1,).
-
-        The default is the camera in the middle. "mean" is the mean of all views, in colours. `axes` are by
-        default those of a new figure. Raises `InputError` for a camera outside the grid.
-        """
-        from pcii.figures.plots import plot_view
-
-        if view == "mean":  # at its own exposure the sum looks like the mean
-            views = np.ndindex(self.grid.rows, self.grid.cols)
-            light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
-            title = f"mean of all views, photons: {self.total}"
-            return plot_view(axes, colours_and_samples(light[..., None], self.cfa), title)
-        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
-        counts = self.view(k, l)
-        return plot_view(axes, counts, f"view ({k}, {l}), photons: {counts.sum()}")
+    def sum_of_views(self) -> tuple[np.ndarray, np.ndarray]:
+        """Photons of all views, and numbers of views, (H, W, C) each, in the colours of the pixels."""
+        views = np.ndindex(self.grid.rows, self.grid.cols)
+        light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
+        return colours_and_samples(light[..., None], self.cfa)
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.

@@ -1,10 +1,11 @@
-"""Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
+"""The light of a dataset, and photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 
 The light of a scope is normalised to 1 and multiplied by a budget of photons: the expected photons of each
 pixel. A scope is a view, each colour of a view, or all views.
 """
 
 from dataclasses import dataclass
+from typing import Literal, cast, get_args
 
 import numpy as np
 
@@ -19,22 +20,59 @@ MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""
 
 
+Scope = Literal["view", "channel", "scene", "exposure", "full-light"]
+
+
 @dataclass(frozen=True)
 class Light:
-    """`photons` expected in each `scope`: a "view", a colour of a view ("channel") or all views ("scene")."""
+    """The light of a dataset: `photons` expected in each `scope`.
 
-    photons: float
-    scope: str = "view"
+    A scope is a "view", a colour of a view ("channel") or all views ("scene"). Of an "exposure" no number is
+    stated; "full-light" is the radiance itself. `str` has the text of a light, which names files and columns,
+    and `parse` reads it. Raises `InputError` for a number that is not above 0 or is larger than 10^12, and
+    for one of an exposure or of full light.
+
+    >>> str(Light(1000)), str(Light(300, "channel")), str(FULL_LIGHT), Light.parse("1e3")
+    ('1000', '300-per-channel', 'full-light', Light(photons=1000.0, scope='view'))
+    """
+
+    photons: float | None = None
+    scope: Scope = "view"
+
+    def __post_init__(self) -> None:
+        scopes, number = get_args(Scope), self.photons
+        if self.scope not in scopes:
+            raise InputError(f"scope: expected one of {', '.join(scopes)}, got {self.scope!r}")
+        if self.scope in ("exposure", "full-light"):
+            if number is not None:
+                raise InputError(
+                    f"photons: light of the scope {self.scope!r} states no number, got {number!r}"
+                )
+            return
+        is_number = isinstance(number, int | float | np.number) and not isinstance(number, bool)
+        if number is None or not is_number or not 0 < number <= MOST_PHOTONS:
+            raise InputError(f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {number!r}")
+        object.__setattr__(self, "photons", float(number))
 
     @classmethod
-    def per_view(cls, photons: object) -> "Light":
-        """Light of so many photons in each view; `InputError` unless they are above 0 and at most 10^12."""
-        is_number = isinstance(photons, int | float | np.integer | np.floating)
-        if isinstance(photons, bool) or not is_number or not 0 < float(photons) <= MOST_PHOTONS:
-            raise InputError(
-                f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {photons!r}"
-            )
-        return cls(float(photons))
+    def parse(cls, text: str) -> "Light":
+        """The light of a text: "1000" photons per view, "300-per-channel", "exposure" or "full-light"."""
+        if text in ("exposure", "full-light"):
+            return cls(None, text)
+        number, _, scope = text.partition("-per-")
+        try:
+            return cls(float(number), cast("Scope", scope or "view"))
+        except ValueError:
+            expected = "photons per view, a number above 0, or full-light"
+            raise InputError(f"light: expected {expected}, got {text!r}") from None
+
+    def __str__(self) -> str:
+        if self.photons is None:
+            return self.scope
+        return f"{self.photons:.15g}" + ("" if self.scope == "view" else f"-per-{self.scope}")
+
+
+FULL_LIGHT, BY_EXPOSURE = Light(None, "full-light"), Light(None, "exposure")
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
@@ -72,6 +110,8 @@ def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.nd
     """
     if not np.all(np.isfinite(energies)):
         raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
+    if light.photons is None:
+        raise InputError(f"light: {light} states no number of photons")
     # The energy of the scope of each pixel, or of all.
     own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
     with np.errstate(over="ignore"):
@@ -96,12 +136,12 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
     >>> limit_photons(views, 1000, seed=1, cfa="GRBG")
     PhotonCounts(shape=1 x 2 x 40 x 60, cfa=GRBG, photons=2056, storage=events)
     """
-    light = Light.per_view(photons)
+    light = Light(photons)
     if not is_whole(seed) or seed < 0:
         raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
     has_one_channel = views.radiance.shape[4] == 1
     if has_one_channel and cfa not in (None, views.cfa):
-        raise InputError(f"cfa: views of one channel have the pattern {views.cfa}, not {cfa}")
+        raise InputError(f"cfa: views of one channel are of a {views.cfa or 'mono'} sensor, not {cfa}")
     pattern, grid = views.cfa or cfa, views.grid
     columns: list[list[np.ndarray]] = []
     for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):

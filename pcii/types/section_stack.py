@@ -1,30 +1,25 @@
 """Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, listed, times
-from pcii.types.arrays import read_only
+from pcii.base.short_form import listed, times
+from pcii.types.arrays import Drawn, read_only
 from pcii.types.bayer import by_colour, check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_events import PLAIN, Readout
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from pcii.figures.panels import Style
-
 Shifts = Literal["nearest", "even"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sections(ShortForm):
+class Sections(Drawn):
     """Sections of the scene at `planes`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons, real
@@ -101,23 +96,6 @@ class Sections(ShortForm):
     def saturated(self) -> np.ndarray:
         """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
         return np.isinf(self.estimate)
-
-    def plot(
-        self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, *, style: "Style" = "screen"
-    ) -> np.ndarray:
-        """Draw the sections in their colours, a panel each, and return the Matplotlib axes (N,).
-
-        All have the same exposure: the 98th percentile of what is lit is white, each mean counting as often
-        as it has samples. Of more than 12 sections 12 are drawn. `axes` has those of each panel, by default
-        of a new figure. Raises `InputError` for another number of them, and for an unknown style.
-
-        For print, `style="paper"` has a white background and a scale bar in mm at the depth of the section
-        instead of axes in pixels: `sections.plot(style="paper")[0].figure.savefig("sections.pdf")`, or .svg.
-        """
-        from pcii.figures.plots import plot_sections
-
-        px_at_1mm = self.grid.pixel_mm / self.grid.focal_mm
-        return plot_sections(axes, self.z_mm, self.in_colours, self.grid.shape_HW, px_at_1mm, style)
 
     def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""

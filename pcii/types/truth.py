@@ -1,17 +1,13 @@
 """Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.types.arrays import read_only
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from pcii.base.short_form import listed, span, times
+from pcii.types.arrays import Drawn, read_only
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 """Maps that a dataset may lack."""
@@ -33,7 +29,7 @@ class PhotonTruth:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Truth(ShortForm):
+class Truth(Drawn):
     """Surfaces in the image of the virtual centre camera, from first hits of rays through pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
@@ -84,21 +80,6 @@ class Truth(ShortForm):
     def object_z_mm(self) -> np.ndarray:
         """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
         return np.where(self.object_id > 0, self.z_mm, np.inf) if self.has_objects else self.z_mm
-
-    def plot(
-        self,
-        axes: "Axes | Sequence[Axes] | np.ndarray | None" = None,
-        *,
-        z_range_mm: tuple[float, float] | None = None,
-    ) -> np.ndarray:
-        """Draw `object_z_mm`, and the objects with names beside them; return the Matplotlib axes (2,).
-
-        The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
-        two, by default of a new figure. Raises `InputError` for another number.
-        """
-        from pcii.figures.plots import plot_truth
-
-        return plot_truth(axes, self.object_z_mm, self.object_id, self.names, z_range_mm)
 
 
 def _check_map(

@@ -39,7 +39,7 @@ def lint(
     views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
     first = f"; of {', '.join(sweep.fields)} the first value" if sweep.axes else ""
-    line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {sensor.cfa}{first}"
+    line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {sensor.bayer or 'mono'}{first}"
     if lack := shortage(target.recipe, None, available_bytes()):  # so that it cannot even be looked at
         return line, [Finding("bad", "memory", lack)]
     return line, findings(probe_scene(target))

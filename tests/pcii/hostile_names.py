@@ -1,4 +1,4 @@
-"""Fifty names by which a stranger might try to get more out of a page than text."""
+"""Names by which a stranger might try to get more out of a page than text."""
 
 RAN = "data-ran"
 """Attribute of the page's root that every attempt sets, should it be carried out."""
@@ -8,48 +8,25 @@ SENT = f"<svg onload={DO}>"
 
 NAMES = (
     f"<script>{DO}</script>",
-    f"<SCRIPT>{DO}</SCRIPT>",
-    f'<script src="data:text/javascript,{DO}"></script>',
     f"<scr<script>ipt>{DO}</scr</script>ipt>",
-    f"<script\n>{DO}</script\n>",
     f"<img src=x onerror={DO}>",
     f'"><img src=x onerror="{DO}">',
-    f"'><img src=x onerror='{DO_QUOTED}'>",
-    f"<img src=x onerror\x00={DO}>",
-    f"<img\tsrc=x\tonerror\n=\n{DO}>",
-    f"<img/src=x/onerror={DO}>",
     f'" onerror="{DO}" x="',
     f"' onload='{DO_QUOTED}' x='",
-    f"` onerror={DO} x=`",
     f'" autofocus onfocus="{DO}" tabindex="0',
-    f"<svg/onload={DO}>",
     f"<svg><script>{DO}</script></svg>",
-    f"<svg><animate onbegin={DO} attributeName=x dur=1s></svg>",
-    f"<math><mtext></mtext><script>{DO}</script></math>",
-    f"<body onload={DO}>",
-    f"<details open ontoggle={DO}>",
-    f"<video><source onerror={DO}></video>",
-    f"<input autofocus onfocus={DO}>",
-    f"<marquee onstart={DO}>",
     f'<iframe src="javascript:parent.{DO}"></iframe>',
     f'<iframe srcdoc="<script>parent.{DO}</script>"></iframe>',
     f'<object data="javascript:{DO}"></object>',
-    f'<embed src="javascript:{DO}">',
     f'<a href="javascript:{DO}" id=go>go</a>',
     f"[go](javascript:{DO})",
-    f"![go](x){{onerror={DO}}}",
-    f"<javascript:{DO}>",
-    f"javascript:{DO}",
     f'<meta http-equiv="refresh" content="0;url=javascript:{DO}">',
     '<base href="https://example.invalid/"><link rel=stylesheet href=x>',
     f"</style><script>{DO}</script><style>",
-    f"</title><script>{DO}</script><title>",
     f"</textarea></main></body></html><script>{DO}</script>",
     f"--><script>{DO}</script><!--",
-    f"]]><script>{DO}</script><![CDATA[",
     f"{{{{ ''.__class__ }}}}{{% if 1 %}}{SENT}{{% endif %}}",
     f"&lt;script&gt;{DO}&lt;/script&gt; &amp;#60;",
-    f"&#60;script&#62;{DO}&#60;/script&#62;",
     "a | b || c\n\n| d | e |\n|---|---|\n# f\n<b>g</b>",
     "*stars* _lines_ `ticks` ~~struck~~ $\\frac{1}{0}$ \\| \\",
     "\u202egnp.exe\u202c \u2066\u2067turned\u2069 \u200fright",
@@ -58,4 +35,3 @@ NAMES = (
     "日本語 עברית ελληνικά 👩‍🔬 e\u0301 " + SENT,
     "long " + "w" * 5000 + SENT,
 )
-assert len(set(NAMES)) == 50

@@ -54,31 +54,6 @@ def cases(number: int, margin: int = 0) -> Iterator[Case]:
             yield Case(grid, cfa, float(rng.uniform(0.8, 4)), int(rng.integers(1, 4)), counts, rng)
 
 
-def test_sections_are_linear(number: int) -> None:
-    for case in cases(number):
-        other = case.rng.poisson(1.0, case.counts.shape)
-        one, two, both = (case.section(n) for n in (case.counts, other, case.counts + 3 * other))
-        np.testing.assert_array_equal(one.counts + 3 * two.counts, both.counts)
-        np.testing.assert_array_equal(one.coverage, both.coverage)
-
-
-def test_sections_do_not_depend_on_the_order_of_views_or_photons(number: int) -> None:
-    for case in cases(number):
-        grid, rng = case.grid, case.rng
-        whole = case.section(case.counts).counts
-        k, l, i, j = np.nonzero(case.counts)
-        order = rng.permutation(k.size)
-        shuffled = PhotonCounts.from_events(
-            *(index[order] for index in (k, l, i, j)), case.counts[k, l, i, j][order], grid, cfa=case.cfa
-        )
-        again = reconstruct(shuffled, case.z_mm, subpixel=case.subpixel).counts
-        np.testing.assert_array_equal(again, whole)
-        # Views that are added some now, some later, add up to the same.
-        first = rng.integers(0, 2, (grid.rows, grid.cols, 1, 1))
-        parts = [case.section(case.counts * chosen).counts for chosen in (first, 1 - first)]
-        np.testing.assert_array_equal(parts[0] + parts[1], whole)
-
-
 def mirrored(cfa: str | None, size: int, axis: int) -> str | None:
     """The pattern of a mosaic of so many rows (or columns) when it is turned round."""
     if cfa is None or size % 2:

@@ -103,8 +103,7 @@ def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: f
         sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, variance=True)
     except pcii.InputError as fault:
         assert str(fault).startswith("radiance: ")  # noqa: PT017
-        # Its square is too large for float64, or that of the greatest difference is too small for it.
-        assert not np.isfinite(light).all() or np.abs(light).max() > 1e150 or 0 < np.ptp(light) < 1.5e-154
+        assert not np.isfinite(light).all() or np.abs(light).max() > 1e150  # its square is too large
         return
     assert sections.variance is not None
     assert np.isfinite(sections.estimate).all()
@@ -184,11 +183,11 @@ def test_sections_scale_with_the_light(seed: int, z_mm: float, power: int) -> No
     np.testing.assert_array_equal(plain.coverage, scaled.coverage)
 
 
-@given(SEEDS, DEPTHS, st.integers(-(2**30), 2**30), st.sampled_from([1, 2]))
-def test_variance_does_not_change_with_what_is_added_to_all(seed, z_mm, added, subpixel) -> None:
+@given(SEEDS, DEPTHS, st.integers(-(2**30), 2**30))
+def test_variance_does_not_change_with_what_is_added_to_all(seed, z_mm, added) -> None:
     light = light_of(SMALL, seed)
     plain, moved = (
-        pcii.reconstruct(pcii.Views(light + offset, SMALL), z_mm, subpixel=subpixel, variance=True).variance
+        pcii.reconstruct(pcii.Views(light + offset, SMALL), z_mm, variance=True).variance
         for offset in (0, added)
     )
     assert plain is not None

@@ -20,7 +20,7 @@ GRID = pcii.CameraGrid(rows=3, cols=4, pitch_mm=(5.0, 4.0), focal_mm=50.0, pixel
 
 MODES: list[dict[str, Any]] = [
     {"variance": True},
-    {"subpixel": 2, "variance": True},
+    {"subpixel": 2},
 ]
 
 

@@ -37,13 +37,11 @@ def test_brightness_claims_nothing_of_an_even_dark():
 
 
 @pytest.mark.parametrize("method", ["brightness", "variance", "shape-from-focus"])
-@pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("count", [3, 2**40])
-@pytest.mark.parametrize("size", [(1, 1), (40, 44)])
-def test_an_even_section_has_one_class_and_it_is_dark(method, cfa, count, size):
+@pytest.mark.parametrize(("count", "size"), [(3, (1, 1)), (2**40, (40, 44))])
+def test_an_even_section_has_one_class_and_it_is_dark(method, count, size):
     # A saturated counter. Roundings of the root of a large count are too small a range for a histogram.
     grid = unit_grid(3, 3, *size)
-    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa=cfa)
+    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa="GRBG")
     assert not segment(counts, [0.5, 1.0], method=method).in_focus.any()
 
 

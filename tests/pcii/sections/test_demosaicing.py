@@ -89,27 +89,6 @@ def test_demosaicing_is_eqs_4_to_6_to_the_bit(raw, cfa):
     np.testing.assert_array_equal(demosaic(raw, cfa=cfa), demosaic_twin(raw, cfa))
 
 
-@given(raw=images, cfa=st.sampled_from(PATTERNS))
-@at_least(100)
-def test_what_the_sensor_saw_is_kept(raw, cfa):
-    np.testing.assert_array_equal(mosaic(demosaic(raw, cfa=cfa), cfa), raw)
-
-
-@given(raw=images, cfa=st.sampled_from(PATTERNS))
-@at_least(100)
-def test_rows_and_columns_are_treated_alike(raw, cfa):
-    transposed = cfa[0] + cfa[2] + cfa[1] + cfa[3]
-    np.testing.assert_array_equal(demosaic(raw.T, cfa=transposed), np.swapaxes(demosaic(raw, cfa=cfa), 0, 1))
-
-
-@pytest.mark.parametrize("cfa", PATTERNS)
-@pytest.mark.parametrize("size", [(2, 2), (2, 5), (3, 3), (6, 7)])
-def test_a_constant_colour_is_reproduced_to_the_border(cfa, size):
-    # Any numbers: differences of equal numbers vanish, and sums of 2 or 4 of these are exact.
-    rgb = np.broadcast_to(np.array([0.75, 0.5, 0.125]), (*size, 3))
-    np.testing.assert_array_equal(demosaic(mosaic(rgb, cfa), cfa=cfa), rgb)
-
-
 @pytest.mark.parametrize("cfa", PATTERNS)
 @pytest.mark.parametrize("along_rows", [True, False])
 def test_stripes_are_reproduced_exactly(cfa, along_rows):
@@ -137,42 +116,15 @@ def test_what_cannot_be_demosaiced_is_refused_by_name(raw, options, words):
         demosaic(raw, **options)
 
 
-# Other methods
-
-COMPARED = ["bilinear", "malvar", "menon"]
-
-
-@pytest.mark.parametrize("method", COMPARED)
-@pytest.mark.parametrize("cfa", PATTERNS)
-def test_every_method_keeps_its_sites_and_a_grey_image(method, cfa):
-    rng = np.random.default_rng(1)
-    raw = rng.random((12, 15))
-    image = demosaic(raw, cfa=cfa, method=method)
-    at_sites = np.take_along_axis(image, colour_index(12, 15, cfa)[..., None].astype(np.int64), axis=2)[
-        ..., 0
-    ]
-    np.testing.assert_allclose(at_sites, raw, rtol=1e-12)
-    np.testing.assert_allclose(demosaic(np.full((9, 8), 0.3), cfa=cfa, method=method), 0.3, rtol=1e-12)
-
-
-@pytest.mark.parametrize("method", COMPARED)
-def test_colours_do_not_mix_at_the_border_by_any_method(method):
-    # Red is 1 and the rest 0.2: the package alone lets a border's red leak into the other colours.
-    flat = mosaic(np.broadcast_to([1.0, 0.2, 0.2], (10, 10, 3)), "RGGB")
-    image = demosaic(flat, cfa="RGGB", method=method)
-    np.testing.assert_allclose(image, np.broadcast_to([1.0, 0.2, 0.2], image.shape), atol=1e-12)
-
-
-@pytest.mark.parametrize("method", COMPARED)
-def test_no_method_changes_how_numbers_are_printed(method):
+@pytest.mark.parametrize("method", ["bilinear", "malvar", "menon"])
+def test_other_methods_keep_what_the_sensor_saw_and_mix_no_colours_at_the_border(method):
+    raw = np.random.default_rng(1).random((12, 15))
     before = np.get_printoptions()
-    demosaic(np.ones((4, 4)), method=method)
+    for cfa in PATTERNS:
+        np.testing.assert_allclose(mosaic(demosaic(raw, cfa=cfa, method=method), cfa), raw, rtol=1e-12)
     assert np.get_printoptions() == before
-
-
-@pytest.mark.parametrize("method", COMPARED)
-@pytest.mark.parametrize("shape", [(2, 2), (2, 7), (3, 3), (5, 2)])
-def test_small_images_have_an_answer_by_every_method(method, shape):
-    image = demosaic(np.arange(np.prod(shape), dtype=float).reshape(shape), method=method)
-    assert image.shape == (*shape, 3)
-    assert np.isfinite(image).all()
+    # Red is 1 and the rest 0.2: the package alone lets a border's red leak into the other colours.
+    flat = np.broadcast_to([1.0, 0.2, 0.2], (10, 10, 3))
+    image = demosaic(mosaic(flat, "RGGB"), cfa="RGGB", method=method)
+    np.testing.assert_allclose(image, flat, atol=1e-12)
+    assert np.isfinite(demosaic(raw[:2, :2], method=method)).all()

@@ -119,10 +119,6 @@ def test_frames_follow_their_events() -> None:
         (0, 1, 2, 0, 0), (0, 1, 2, 0, 1), (0, 1, 2, 0, 4), (0, 1, 2, 4, 3),
         (1, 0, 3, 5, 0), (1, 0, 3, 5, 2), (1, 0, 3, 5, 4),
     ]  # fmt: skip
-    part = counts[1:, :]
-    assert part.readout == counts.readout
-    assert part.frame is not None
-    assert part.frame.tolist() == [0, 2, 4]
     some = counts.subsample(3, np.random.default_rng(1))
     assert some.frame is not None
     assert some.frame.size == some.total < counts.total
@@ -148,16 +144,3 @@ def test_what_frames_cannot_hold_is_refused(changed: dict, named: str) -> None:
         PhotonCounts.from_events(
             *np.array([[0], [0], [1], [1]]), n, FILM, **said, frame=frame if "frame" in changed else None
         )
-
-
-def test_a_dataset_keeps_frames(tmp_path) -> None:
-    counts = with_frames()
-    dataset = pcii.save_dataset(tmp_path / "kept", counts)
-    assert dataset.counts.readout == Readout(5, 1)
-    assert dataset.counts.frame is not None
-    np.testing.assert_array_equal(dataset.counts.frame, counts.frame)
-    sums = pcii.save_dataset(tmp_path / "sums", PhotonCounts.from_dense(counts.dense, FILM, frames=5, bits=1))
-    assert sums.counts.frame is None
-    assert sums.counts.readout == Readout(5, 1)
-    plain = pcii.save_dataset(tmp_path / "plain", PhotonCounts.from_dense(counts.dense, FILM))
-    assert plain.manifest["identity"] != sums.manifest["identity"]
