@@ -30,7 +30,7 @@ from simgen.truth.first_hits import first_hits_of_view
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"
 # A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
-DRAWS = 100 if COMPILED else 25
+DRAWS = 40 if COMPILED else 25
 MANY = 400_000 if COMPILED else 50_000
 COLOUR_BIAS = 0.01 if COMPILED else 0.05
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
