@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -78,6 +79,7 @@ KNOW_RECIPE = {
 SMALL_ROOMS: set[str] = set()
 
 
+@cache
 def modules(package: str) -> dict[str, ast.Module]:
     """Every module of a package by its dotted name; a package by its own."""
     found: dict[str, ast.Module] = {}
@@ -102,6 +104,7 @@ def imported(node: ast.AST) -> set[str]:
     return set()
 
 
+@cache
 def all_imports(tree: ast.Module) -> set[str]:
     return set().union(*(imported(node) for node in ast.walk(tree)))
 

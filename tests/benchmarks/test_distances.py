@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.photon_distance import Rates, distances
 from benchmarks.studies import demosaicing, radiance_images
-from benchmarks.studies.depth_and_focus import BOUND, DEPTH, REMOVAL, _ratios, _rows
 from benchmarks.studies.photon_images import CROSSOVERS, THINNING, _crossovers, dense_name
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
@@ -76,37 +75,3 @@ def test_bias_is_told_from_noise_on_what_is_lit(black_rows: int) -> None:
     assert radiance_images.errors((noisy + 0.2 * truth).astype(np.float32), truth)[
         "bias_percent"
     ].value == pytest.approx(20, rel=0.1)
-
-
-def test_results_of_an_evaluation_become_rows() -> None:
-    def mean(value: float) -> dict[str, object]:
-        return {"n": 2, "mean": value, "interval": [value / 2, 2 * value]}
-
-    group = {
-        "title": "balls",
-        "results": [
-            {
-                "budget": 100.0,
-                "method": "depth:posterior",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.1), "median_px": None},
-                "bounds": {"objects": [{"name": "ball", "depth_sigma_px": mean(0.25)}]},
-            },
-            {
-                "budget": 100.0,
-                "method": "depth:variance-sweep",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.4)},
-            },
-            {"budget": 100.0, "method": "likelihood", "seconds": mean(1.0), "object": {"iou": mean(0.8)}},
-        ],
-    }
-    rows = _rows(group)
-    assert [row.table for row in rows] == [DEPTH, DEPTH, REMOVAL, BOUND]
-    assert rows[0].values["time_ms"].high == 1000
-    assert rows[0].values["bad_1px_percent"].value == 10
-    assert "median_px" not in rows[0].values
-    assert rows[3].parameters["object"] == "ball"
-    (ratio,) = _ratios(rows)
-    assert ratio.name == "balls, 100 photons: errors of the better sweep against depth:posterior"
-    assert ratio.ratio.value == pytest.approx(4)
