@@ -217,3 +217,22 @@ def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: in
     assert np.isfinite(plain.z_mm).any()
     np.testing.assert_array_equal(np.isfinite(plain.z_mm), np.isfinite(scaled.z_mm))
     np.testing.assert_allclose(plain.z_mm, scaled.z_mm, rtol=1e-6)
+
+
+def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
+    """Red light of 1 has a luminance of 0.2126, which was cut off to 0: no photons at all."""
+    light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
+    light[..., 0] = 1
+    assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
+
+
+@pytest.mark.parametrize("encoding", ["srgb", "linear", 2.2, 10.0])
+@pytest.mark.parametrize(("value", "dtype"), [(6e4, np.float16), (3e38, np.float32), (1e300, np.float64)])
+def test_imported_light_is_finite_or_refused(value: float, dtype: type, encoding: Any) -> None:
+    numbers = np.full((1, 2, 2, 2), value, dtype)
+    try:
+        light = pcii.import_arrays(numbers, OPTICS, encoding=encoding).radiance
+    except pcii.InputError as fault:
+        assert "too bright for float32" in str(fault)  # noqa: PT017
+        return
+    assert np.isfinite(np.asarray(light)).all()

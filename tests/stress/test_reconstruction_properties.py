@@ -14,6 +14,7 @@ from twins import unit_grid
 
 import pcii
 from pcii.evaluation.paired_tests import mean_interval
+from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.mask_outlines import boundary_f
 from pcii.metrics.depth_accuracy import depth_errors
 from pcii.metrics.true_masks import mask_agreement
@@ -267,3 +268,11 @@ def test_the_true_depth_has_no_error(z_mm: np.ndarray) -> None:
     errors = depth_errors(SMALL, pcii.DepthMap(z_mm, np.ones(z_mm.shape)), truth)
     assert errors["mae_mm"] == errors["bad_1px"] == errors["median_px"] == errors["ece"] == 0
     assert errors["coverage"] == 1
+
+
+@given(nst.arrays(np.int64, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 2**50)))
+def test_cells_have_all_that_their_pixels_have(pixels: np.ndarray) -> None:
+    for side in (1, 2, 3, 4):
+        cells = block_sums(pixels, side, np.int64)
+        assert int(cells.sum()) == int(pixels.sum())
+        assert on_pixels(cells, side, pixels.shape).shape == pixels.shape

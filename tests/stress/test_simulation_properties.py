@@ -14,7 +14,7 @@ from pcii.types.camera_grid import CameraGrid
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities
-from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens
+from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.scopes import places
 from simgen.sensor.detector import (
@@ -211,3 +211,11 @@ def test_a_grid_is_what_pcii_takes_or_is_refused(values: dict) -> None:
         assert str(fault).startswith("recipe: ")  # noqa: PT017
         return
     assert grid.camera_grid().rows == grid.rows
+
+
+@given(grids, st.floats(1, 50), st.integers(1, 8))
+def test_larger_pixels_keep_the_disparity_in_mm(grid: CameraGrid, scale: float, least: int) -> None:
+    coarse = with_larger_pixels(grid, scale, least_px=least)
+    assert min(coarse.height, coarse.width) >= least
+    fine, other = (np.array(disparities.disparities_px(g, 777.0)) * g.pixel_mm for g in (grid, coarse))
+    np.testing.assert_allclose(fine, other, rtol=1e-9, atol=1e-9)
