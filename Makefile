@@ -1,5 +1,6 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
+# make check-docs   what the guides, the notebooks and the examples show, by running them
 # make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 20 minutes
 # make bench  run time against error, in minutes: tables, figures and a page in out/bench; TABLES="sections"
 #             for one study, TABLES=removal BENCH_SEEDS=3 to compare methods over scenes and seeds, TABLES=depth
@@ -18,13 +19,20 @@ BIN := $(VENV)/bin
 OUT ?= out
 TRAIN_MINUTES ?= 90
 
-.PHONY: demo test stress bench bench-full bench-guard bench-publish bench-setup train docs gallery format clean llvm
+.PHONY: demo test check-docs stress bench bench-full bench-guard bench-publish bench-setup train docs gallery format clean llvm
 .DEFAULT_GOAL := demo
 
+# What the commands need, and beside it what the tests need.
 $(VENV)/.ready: pyproject.toml
+	@echo "Installing the renderer and the analysis in $(VENV): 1 GB, which takes some minutes ..."
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar off --editable '.[render]'
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.ready
+	@echo "Installing ruff, pyright, pytest and what the tests compare with ..."
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $@
+	@touch $@
 
 # Mitsuba's fast mode needs LLVM 17 or newer. Where there is none, root on Debian or Ubuntu gets it;
 # anyone else is told what to type, and everything goes on in the slower scalar mode.
@@ -43,17 +51,21 @@ demo: llvm
 	$(BIN)/pcii run $(OUT)/paper --out $(OUT)/paper-results
 	@echo "Open $(OUT)/paper-results/report.html in a browser."
 
-test: llvm
+# Types are checked while loops are compiled, which each worker of the tests would else do, and while tests run.
+test: llvm $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	@# Types are checked on one core; the other compiles loops, which both workers of the tests would else do.
-	$(BIN)/pyright & types=$$!; folder=$$(mktemp -d); \
+	@folder=$$(mktemp -d); trap 'rm -rf $$folder' EXIT; \
+	$(BIN)/pyright >$$folder/types 2>&1 & types=$$!; \
 	$(BIN)/pcii sample --out $$folder/data --quiet && \
-	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method likelihood --quiet; \
-	compiled=$$?; rm -rf $$folder; wait $$types && exit $$compiled
-	$(BIN)/python -m pytest -n 2 -m "not slow and not stress"
+	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method likelihood --quiet && \
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow and not stress and not guide"; tests=$$?; \
+	wait $$types || { cat $$folder/types; exit 1; }; exit $$tests
 
-stress: llvm
+check-docs: llvm $(VENV)/.ready-dev
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "guide and not slow" tests
+
+stress: llvm $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -n 2 -m "stress or hypothesis" --hypothesis-profile=stress
 
 bench-setup: llvm
@@ -93,7 +105,7 @@ docs: $(VENV)/.ready
 gallery: llvm
 	$(BIN)/python docs/make_gallery.py
 
-format: $(VENV)/.ready
+format: $(VENV)/.ready-dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 

@@ -3,13 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from benchmarks import depth
-from benchmarks.corpus import Entry, drawn_corpus, load_corpus, named_scenes, work_list
+from benchmarks.corpus import Entry, load_corpus, work_list
 from benchmarks.drawn import KINDS, write_recipe
-from benchmarks.removal import mean_iou, report
-from pcii.base.errors import InputError
+from benchmarks.removal import mean_iou
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene_lookup import drawn_scenes
@@ -30,13 +27,6 @@ def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:
         assert first.folder == tmp_path / "data" / first.entry.recipe / f"seed_{first.recipe.seed}"
 
 
-def test_a_corpus_that_is_told_wrongly_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "corpus.toml"
-    path.write_text('[[scene]]\nrecipe = "paper"\nhalf = "both"\nkind = "paper"\n')
-    with pytest.raises(InputError, match="half"):
-        load_corpus(path)
-
-
 def test_every_kind_of_drawn_scene_is_seen_by_the_papers_cameras(tmp_path: Path) -> None:
     assert {f"drawn_{kind}" for kind in KINDS} <= drawn_scenes().keys()
     for kind in KINDS:
@@ -44,25 +34,6 @@ def test_every_kind_of_drawn_scene_is_seen_by_the_papers_cameras(tmp_path: Path)
         paper, _ = load_recipe("paper")
         assert (recipe.grid, recipe.cfa, recipe.photons) == (paper.grid, paper.cfa, paper.photons)
         assert prepare(recipe, near).scene.title == f"Drawn: {kind} 7"
-
-
-def test_drawn_scenes_are_a_corpus(tmp_path: Path) -> None:
-    entries = drawn_corpus("99-100", tmp_path)
-    assert [entry.half for entry in entries] == ["train", "test"] * len(KINDS)
-    works = work_list(entries, tmp_path / "out", 1, [300])
-    assert [work.recipe.title for work in works][:2] == ["plain_99", "plain_100"]
-    assert works[0].folder.parent == tmp_path / "out" / "data" / "plain_99"
-    assert len(drawn_corpus("7", tmp_path)) == len(KINDS)
-    with pytest.raises(InputError, match="BENCH_DRAWN"):
-        drawn_corpus("some", tmp_path)
-
-
-def test_a_few_scenes_are_taken_by_name() -> None:
-    entries = load_corpus()
-    assert named_scenes(entries, []) == entries
-    assert [entry.name for entry in named_scenes(entries, ["slats", "paper"])] == ["paper", "slats"]
-    with pytest.raises(InputError, match="BENCH_SCENES: there is no scene named 'nothing'; use paper, "):
-        named_scenes(entries, ["nothing"])
 
 
 def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict[str, Any]:
@@ -106,14 +77,6 @@ def test_means_by_half_and_kind_are_counted_by_hand() -> None:
         ("train", "cluttered", "m", "1", "0.750", "1.000"),
         ("train", "textured", "m", "1", "0.250", "0.500"),
     )
-
-
-def test_the_report_tells_every_scene() -> None:
-    text = "\n".join(report({"interval": "95 %", "groups": GROUPS}, ENTRIES))
-    assert "8 datasets" in text
-    for title in ("balls", "slats", "stones"):
-        assert f"| {title} | m |" in text
-    assert "0.250 (0.000 to 0.500)" in text
 
 
 def errors(recipe: str, bad_1px: dict[tuple[float, str], float | None]) -> dict[str, Any]:

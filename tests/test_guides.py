@@ -153,6 +153,7 @@ def case(name: str) -> object:
     return pytest.param(name, id=name, marks=marks)
 
 
+@pytest.mark.guide
 @pytest.mark.parametrize("name", [case(name) for name in RUN])
 def test_a_page_runs(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest

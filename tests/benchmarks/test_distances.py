@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.photon_distance import Rates, distances
-from benchmarks.studies import demosaicing, radiance_images, section_growth, sections, skips
-from benchmarks.studies.depth_and_focus import BOUND, DEPTH, REMOVAL, _ratios, _rows
+from benchmarks.studies import demosaicing, radiance_images
 from benchmarks.studies.photon_images import CROSSOVERS, THINNING, _crossovers, dense_name
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
@@ -58,21 +57,6 @@ def test_crossovers_lie_between_the_budgets_that_were_tried() -> None:
     assert found[1].values["photons_per_view"].value == pytest.approx(100)
 
 
-def test_exponents_are_slopes_of_logarithms() -> None:
-    numbers = [1, 10, 100]
-    found = section_growth._slope(numbers, [[0.1 * n**1.5] * 6 for n in numbers])
-    assert found.value == pytest.approx(1.5)
-
-
-def test_errors_of_sections_are_relative_to_the_contrast() -> None:
-    truth = np.full((64, 64, 1), 0.5)
-    found = truth + 0.03
-    found[20, 20] = np.nan
-    told = sections.errors(found, truth, 8)
-    assert told["rmse_percent"].value == pytest.approx(20)
-    assert told["covered_percent"].value == pytest.approx(100 * (1 - 1 / 48**2))
-
-
 def test_errors_of_colours_by_hand() -> None:
     truth = np.full((16, 16, 3), 0.5)
     told = demosaicing.errors(truth + 0.1, truth)
@@ -91,44 +75,3 @@ def test_bias_is_told_from_noise_on_what_is_lit(black_rows: int) -> None:
     assert radiance_images.errors((noisy + 0.2 * truth).astype(np.float32), truth)[
         "bias_percent"
     ].value == pytest.approx(20, rel=0.1)
-
-
-def test_a_difference_of_one_byte_is_a_difference() -> None:
-    one = {"a": np.array([1.0, np.nan]), "b": np.zeros(2, np.int64)}
-    assert skips.are_same(one, {name: each.copy() for name, each in one.items()})
-    assert not skips.are_same(one, one | {"b": np.array([0, 1])})
-    assert not skips.are_same(one, {"a": one["a"]})
-
-
-def test_results_of_an_evaluation_become_rows() -> None:
-    def mean(value: float) -> dict[str, object]:
-        return {"n": 2, "mean": value, "interval": [value / 2, 2 * value]}
-
-    group = {
-        "title": "balls",
-        "results": [
-            {
-                "budget": 100.0,
-                "method": "depth:posterior",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.1), "median_px": None},
-                "bounds": {"objects": [{"name": "ball", "depth_sigma_px": mean(0.25)}]},
-            },
-            {
-                "budget": 100.0,
-                "method": "depth:variance-sweep",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.4)},
-            },
-            {"budget": 100.0, "method": "likelihood", "seconds": mean(1.0), "object": {"iou": mean(0.8)}},
-        ],
-    }
-    rows = _rows(group)
-    assert [row.table for row in rows] == [DEPTH, DEPTH, REMOVAL, BOUND]
-    assert rows[0].values["time_ms"].high == 1000
-    assert rows[0].values["bad_1px_percent"].value == 10
-    assert "median_px" not in rows[0].values
-    assert rows[3].parameters["object"] == "ball"
-    (ratio,) = _ratios(rows)
-    assert ratio.name == "balls, 100 photons: errors of the better sweep against depth:posterior"
-    assert ratio.ratio.value == pytest.approx(4)

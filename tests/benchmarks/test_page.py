@@ -3,21 +3,13 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
-from records import MACHINE, MEASURED, STUDY, record
+from records import MEASURED, STUDY, record
 
 from benchmarks import __main__ as command
 from benchmarks.figures import draw
-from benchmarks.page import tables_of, told, write_html, write_markdown
-from benchmarks.results import Value, read_record
+from benchmarks.page import write_html, write_markdown
+from benchmarks.results import read_record
 from benchmarks.studies import STUDIES
-
-
-def test_tables_have_a_column_for_each_parameter_and_quantity() -> None:
-    errors, memory = tables_of(MEASURED.rows)
-    assert errors.header == ("what", "samples", "time, ms", "RMSE, %")
-    assert errors.rows == (("ours", "4", "2 (1.5 to 2.5)", "0.125"), ("theirs <b>", "16", "8", "–"))
-    assert memory.rows == (("ours", "1230"),)
-    assert told(Value(1.5e-7)) == "1.5e-07"
 
 
 def test_the_markdown_page_has_figure_reading_tables_and_ratios(tmp_path: Path) -> None:
@@ -30,11 +22,6 @@ def test_the_markdown_page_has_figure_reading_tables_and_ratios(tmp_path: Path) 
     assert "busy" not in text
     with Image.open(tmp_path / "benchmarks" / "nothing.png") as picture:
         assert min(picture.size) > 300
-
-
-def test_the_page_says_that_the_machine_was_busy(tmp_path: Path) -> None:
-    write_markdown(tmp_path / "page.md", [STUDY], [record(machine=MACHINE | {"cores_in_use": 1.5})])
-    assert "busy with other work when it began (1.5 cores in use)" in (tmp_path / "page.md").read_text()
 
 
 def test_the_html_page_is_one_file_that_escapes_what_it_shows(tmp_path: Path) -> None:

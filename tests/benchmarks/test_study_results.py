@@ -1,11 +1,10 @@
-import csv
 import json
 from pathlib import Path
 
 import pytest
-from records import MEASURED, record
+from records import record
 
-from benchmarks.results import label, read_record, write_record
+from benchmarks.results import read_record, write_record
 from benchmarks.timing import median_of, ratio_of, side_by_side, timed
 from pcii.base.errors import InputError
 
@@ -18,39 +17,12 @@ def test_a_record_reads_as_it_was_written(tmp_path: Path) -> None:
     assert content["measured"]["seeds"] == [1, 2]
 
 
-def test_the_csv_has_a_line_for_every_value(tmp_path: Path) -> None:
-    write_record(tmp_path, record())
-    with (tmp_path / "nothing.csv").open(newline="") as file:
-        lines = list(csv.reader(file))
-    assert lines[0] == ["table", "name", "samples", "quantity", "value", "low", "high"]
-    assert lines[1] == ["Errors", "ours", "4", "time_ms", "2.0", "1.5", "2.5"]
-    assert lines[2] == ["Errors", "ours", "4", "rmse_percent", "0.125", "", ""]
-    assert len(lines) == 1 + sum(len(row.values) for row in MEASURED.rows)
-
-
 @pytest.mark.parametrize("text", ["", "[]", '{"study": "nothing"}', "{"])
 def test_a_file_that_is_no_record_is_refused_by_name(tmp_path: Path, text: str) -> None:
     path = tmp_path / "nothing.json"
     path.write_text(text)
     with pytest.raises(InputError, match=r"nothing\.json: expected results of a study"):
         read_record(path)
-
-
-def test_rows_are_found_by_table_name_and_parameters() -> None:
-    assert [row.name for row in MEASURED.of("Errors", samples=16)] == ["theirs <b>"]
-    assert MEASURED.one("Memory", "ours").values["peak_mb"].value == 1234
-    assert MEASURED.ratio("memory") == 1.5
-    with pytest.raises(KeyError, match="Errors: ours"):
-        MEASURED.one("Errors", "ours", samples=16)
-
-
-def test_labels_have_units_and_abbreviations() -> None:
-    assert label("cost_us") == "cost, µs"
-    assert label("peak_mb") == "peak, MB"
-    assert label("samples") == "samples"
-    assert label("ms") == "ms"
-    assert label("badpix_007_percent") == "BadPix(0.07), %"
-    assert [label(name) for name in ("iou", "mse_x100", "rmse_percent")] == ["IoU", "MSE x100", "RMSE, %"]
 
 
 def test_works_take_turns_and_the_first_round_is_not_counted() -> None:

@@ -96,7 +96,7 @@ def test_photons_of_long_paths_are_those_of_rendered_views() -> None:
         built = lit_views.made([room, BALL], [lamp], max_depth=max_depth)
         return built, seen(built, grid, samples)
 
-    built, view = rendered(depth, 2048 if SCALAR else 8192)
+    built, view = rendered(depth, 2048 if SCALAR else 4096)
     gain = (10_000 if SCALAR else 50_000) / view.sum() * 3
     photons, _ = thinned(built, grid, depth, gain)
     assert abs(surprise(photons, view, grid, gain)) < 5

@@ -1,7 +1,5 @@
 """Films of 1 x 1 to 8192 x 8192, 1 to 400 cameras, depths from below a micrometre to beyond the stars."""
 
-import json
-from dataclasses import asdict
 from itertools import product
 
 import numpy as np
@@ -41,19 +39,10 @@ def test_every_method_answers_on_films_of_any_size(size: tuple[int, int], cfa: s
         focus = pcii.segment(counts, [400.0, 500.0], method=method)
         assert focus.in_focus.shape == (2, *size)
         assert np.isfinite(focus.cleaned).all()
-    for method in pcii.depth_methods(counts):
-        depth = pcii.estimate_depth(counts, RANGE_MM, method=method)
-        check_depth(depth, size)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 1), (1, 17), (5, 3)])
-@pytest.mark.parametrize(
-    "method", pcii.depth_methods(pcii.Views(np.ones((1, 1, 1, 1, 1)), unit_grid(1, 1, 1, 1)))
-)
-def test_depth_of_radiance_answers_on_films_of_any_size(size: tuple[int, int], method: str) -> None:
-    grid = grid_of(2, 3, *size)
-    light = np.random.default_rng(2).uniform(0, 1, (*grid.shape_KLHW, 3))
-    check_depth(pcii.estimate_depth(pcii.Views(light, grid), RANGE_MM, method=method), size)
+    views = pcii.Views(np.random.default_rng(2).uniform(0, 1, (*grid.shape_KLHW, 3)), grid)
+    for data in (counts, views):
+        for method in pcii.depth_methods(data):
+            check_depth(pcii.estimate_depth(data, RANGE_MM, method=method), size)
 
 
 def check_depth(depth: pcii.DepthMap, size: tuple[int, int]) -> None:
@@ -79,7 +68,7 @@ def test_sections_of_any_number_of_cameras_are_eq_3(cameras: tuple[int, int]) ->
     np.testing.assert_array_equal(sections.coverage, coverage)
 
 
-@pytest.mark.parametrize("z_mm", [1e-3, 1.0, 1e3, 1e7, 1e100, 1.7e308])
+@pytest.mark.parametrize("z_mm", [1e-3, 1.0, 1e3, 1e7, 1.7e308])
 @pytest.mark.parametrize("subpixel", [1, 3])
 def test_no_depth_makes_photons_or_loses_those_that_stay(z_mm: float, subpixel: int) -> None:
     grid = grid_of(3, 3, 6, 7)
@@ -102,8 +91,8 @@ def test_what_is_no_depth_is_refused(z_mm: object) -> None:
         pcii.estimate_depth(counts, (z_mm, 600.0))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("z_mm", [5e-324, 1e-320, 1e-300, 1e-9, 1.0, 1e300, 1.7e308])
-@pytest.mark.parametrize("pixel_mm", [5e-324, 1e-300, 0.05, 1e300])
+@pytest.mark.parametrize("z_mm", [5e-324, 1e-300, 1.0, 1.7e308])
+@pytest.mark.parametrize("pixel_mm", [5e-324, 0.05, 1e300])
 @pytest.mark.parametrize("length_mm", [1e-300, 5.0, 1e300])
 @pytest.mark.parametrize("cameras", [1, 2])
 def test_lengths_whose_products_no_number_holds_are_refused_or_right(
@@ -127,38 +116,6 @@ def test_lengths_whose_products_no_number_holds_are_refused_or_right(
         return
     assert section.counts.sum() <= 10
     assert np.isfinite(section.planes.total_disparity_px).all()
-
-
-def test_numbers_of_numpy_s_small_types_do_not_overflow() -> None:
-    """100 x 100 cameras are more than int8 holds, and float16 has three digits."""
-    grid = pcii.CameraGrid(
-        rows=np.int8(100),  # type: ignore[arg-type]
-        cols=np.int8(100),  # type: ignore[arg-type]
-        pitch_mm=(np.float16(5.0), np.float16(5.0)),  # type: ignore[arg-type]
-        focal_mm=np.float16(1000.0),  # type: ignore[arg-type]
-        pixel_mm=np.float16(0.5),  # type: ignore[arg-type]
-        height=np.uint8(200),  # type: ignore[arg-type]
-        width=np.uint8(200),  # type: ignore[arg-type]
-    )
-    assert grid.view_count == 10_000
-    assert total_disparity_px(grid, 123.0) == pytest.approx(99 * 1000 * 5 / (123 * 0.5), rel=1e-15)
-    assert json.loads(json.dumps(asdict(grid)))["rows"] == 100
-
-
-@pytest.mark.parametrize("z_range_mm", [(0.0, 900.0), (-5.0, 900.0), (900.0, 300.0), (np.nan, 900.0)])
-def test_the_check_of_a_grid_refuses_what_is_no_range(z_range_mm: tuple[float, float]) -> None:
-    with pytest.raises(pcii.InputError, match=r"^z_range_mm: "):
-        pcii.check_grid(pcii.Views(np.ones((3, 3, 32, 32, 1)), grid_of(3, 3, 32, 32)), z_range_mm)
-
-
-@pytest.mark.parametrize("value", [0.0, 5e-324, 1e-40, 1e40, 1.7e308, -1e300])
-def test_the_check_of_a_grid_takes_light_of_any_size(value: float) -> None:
-    texture, grid = np.random.default_rng(4).uniform(0.5, 1.0, (3, 3, 32, 32, 1)), grid_of(3, 3, 32, 32)
-    found = [pcii.check_grid(pcii.Views(texture * unit, grid), RANGE_MM) for unit in (value, 1.0)]
-    if value > 1e-300:  # a number of one bit has no texture
-        assert found[0] == found[1]
-    with pytest.raises(pcii.InputError, match=r"^radiance: view \(0, 0\) holds NaN"):
-        pcii.check_grid(pcii.Views(np.full((3, 3, 32, 32, 1), np.nan), grid))
 
 
 @pytest.mark.stress

@@ -9,7 +9,6 @@ from twins import Reader, blocky_texture, patch_views, unit_grid
 
 import pcii
 from pcii.sections.photon_statistics import entropy_bits
-from pcii.types.images import binary_scale
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)
@@ -111,7 +110,7 @@ def test_a_variance_just_below_the_largest_number_is_right() -> None:
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("cfa", [None, "GRBG"])
-@pytest.mark.parametrize("ratio", [1e6, 1e9, 1e12])
+@pytest.mark.parametrize("ratio", [1e6, 1e12])
 def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | None, dtype: type) -> None:
     """Each sum is that of fractions within the roundings of its own samples: no bright neighbour leaks."""
     grid = unit_grid(3, 2, 6, 5, (0.8, 1.4))
@@ -152,13 +151,6 @@ def test_photons_do_not_depend_on_the_unit_of_light(value: float, dtype: type, c
     assert abs(found.total - 4000) < 5 * np.sqrt(4000)
 
 
-def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
-    """Red light of 1 has a luminance of 0.2126, which was cut off to 0: no photons at all."""
-    light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
-    light[..., 0] = 1
-    assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
-
-
 def test_black_views_have_no_photons_and_bright_ones_are_refused() -> None:
     assert pcii.limit_photons(constant(0.0), 1e12, seed=8).total == 0
     with pytest.raises(pcii.InputError, match=r"^radiance: .*more light than can be added up"):
@@ -170,30 +162,9 @@ def test_black_views_have_no_photons_and_bright_ones_are_refused() -> None:
 # Pictures
 
 
-@pytest.mark.parametrize("encoding", ["srgb", "linear", 2.2, 10.0])
-@pytest.mark.parametrize(("value", "dtype"), [(6e4, np.float16), (3e38, np.float32), (1e300, np.float64)])
-def test_imported_light_is_finite_or_refused(value: float, dtype: type, encoding: Any) -> None:
-    numbers = np.full((1, 2, 2, 2), value, dtype)
-    try:
-        light = pcii.import_arrays(numbers, OPTICS, encoding=encoding).radiance
-    except pcii.InputError as fault:
-        assert "too bright for float32" in str(fault)  # noqa: PT017
-        return
-    assert np.isfinite(np.asarray(light)).all()
-
-
-def test_srgb_has_a_value_for_every_number() -> None:
-    numbers = np.array([-1e300, -1.0, -0.0, 5e-324, 1.0, 2.0, 1e300, np.inf])
-    linear = pcii.srgb_to_linear(numbers)
-    assert (linear[1:] >= linear[:-1]).all()
-    assert linear[1] == -1 / 12.92
-    assert np.isinf(linear[-2:]).all()
-    assert np.isnan(pcii.srgb_to_linear(np.array([np.nan]))).all()
-
-
 @pytest.mark.parametrize("method", ["laroche-prescott", "bilinear", "malvar", "menon"])
-@pytest.mark.parametrize("value", [0.0, 5e-324, 1e12, 1e300, 1.7e308, -5.0])
-@pytest.mark.parametrize("shape", [(2, 2), (2, 9), (5, 4)])
+@pytest.mark.parametrize("value", [0.0, 5e-324, 1e300, 1.7e308, -5.0])
+@pytest.mark.parametrize("shape", [(2, 2), (5, 4)])
 def test_demosaicing_gives_finite_colours_or_refuses(
     method: str, value: float, shape: tuple[int, int]
 ) -> None:
@@ -217,7 +188,7 @@ def test_entropy_knows_no_unit(top: float) -> None:
 
 
 @pytest.mark.parametrize("method", ["posterior", "structure-tensor", "variance-sweep"])
-@pytest.mark.parametrize("exponent", [-1000, -120, -40, 40, 120, 960])
+@pytest.mark.parametrize("exponent", [-1000, -40, 960])
 def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: int) -> None:
     grid = unit_grid(3, 3, 32, 32, (4.0, 4.0))
     light = patch_views(blocky_texture(np.random.default_rng(9), 32, 32), 0, 0, 2, grid) + 0.1
@@ -232,9 +203,20 @@ def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: in
     np.testing.assert_allclose(plain.z_mm, scaled.z_mm, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("value", "scale"),
-    [(0, 1), (1, 1), (-1, 1), (2.0**30, 2.0**31), (1.7e308, 2.0**1023), (5e-324, 2.0**-1073)],
-)
-def test_scales_are_powers_of_two_and_never_zero(value: float, scale: float) -> None:
-    assert binary_scale(constant(value)) == scale
+def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
+    """Red light of 1 has a luminance of 0.2126, which was cut off to 0: no photons at all."""
+    light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
+    light[..., 0] = 1
+    assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
+
+
+@pytest.mark.parametrize("encoding", ["srgb", "linear", 2.2, 10.0])
+@pytest.mark.parametrize(("value", "dtype"), [(6e4, np.float16), (3e38, np.float32), (1e300, np.float64)])
+def test_imported_light_is_finite_or_refused(value: float, dtype: type, encoding: Any) -> None:
+    numbers = np.full((1, 2, 2, 2), value, dtype)
+    try:
+        light = pcii.import_arrays(numbers, OPTICS, encoding=encoding).radiance
+    except pcii.InputError as fault:
+        assert "too bright for float32" in str(fault)  # noqa: PT017
+        return
+    assert np.isfinite(np.asarray(light)).all()

@@ -1,7 +1,5 @@
 """Properties of what simulates a sensor and its cameras, without a renderer."""
 
-import math
-
 import numpy as np
 import pytest
 from camera_grids import grids
@@ -16,21 +14,19 @@ from pcii.types.camera_grid import CameraGrid
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities
-from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, turn, with_larger_pixels
+from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.scopes import places
-from simgen.photons.thinning import WAVEFRONT, candidates_needed
 from simgen.sensor.detector import (
     detect,
     draw_counts,
     fixed_totals,
     full_light_image,
     nested_subset,
-    photons_per_radiance,
     read_out,
 )
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Exposure, FullLight, Grid, Lens, Photons, Recipe, Sensor
+from simgen.spec.recipe import FullLight, Grid, Lens, Photons, Sensor
 
 GRID = unit_grid(2, 2, 4, 5)
 SEEDS = st.integers(0, 2**63 - 1)
@@ -66,16 +62,6 @@ def test_a_detector_that_adds_nothing_detects_no_more_than_arrives(seed, number,
     np.testing.assert_array_equal(film_of(whole), film_of(arrivals))
 
 
-@given(SEEDS, st.floats(0, 20), SHARES, st.floats(0, 1e6))
-def test_false_counts_need_no_light_and_are_the_same_again(seed, dark, hot, hot_counts) -> None:
-    sensor = Sensor(dark_counts=dark, hot_pixel_share=hot, hot_pixel_counts=hot_counts)
-    first, again = (detect(photons_of(0, 0), GRID, None, sensor, seed) for _ in range(2))
-    np.testing.assert_array_equal(film_of(first), film_of(again))
-    if dark == 0:
-        hot_pixels = (film_of(first) > 0).any(axis=(0, 1)).sum()
-        assert hot_pixels <= round(hot * GRID.height * GRID.width)
-
-
 @given(SEEDS, st.integers(0, 60), st.integers(1, 32), st.sampled_from([1, 50, 2**40]))
 def test_a_counter_stops_at_its_largest_number(seed: int, number: int, bits: int, most: int) -> None:
     arrivals = photons_of(seed, number, most)
@@ -92,17 +78,6 @@ def test_a_smaller_budget_is_the_first_of_the_larger(seed, number, scopes, data)
     assert table.scope is not None
     for scope in range(scopes):
         assert belongs[table.scope == scope].sum() == min(small, (table.scope == scope).sum())
-
-
-@given(SEEDS, st.integers(0, 40))
-def test_a_table_by_pixel_has_the_same_photons(seed: int, number: int) -> None:
-    table = photons_of(seed, number, 5)
-    ordered = table.by_pixel(GRID)
-    assert (np.diff(ordered.flat_pixels(GRID)) >= 0).all()
-    np.testing.assert_array_equal(film_of(ordered), film_of(table))
-    singles = table.one_by_one()
-    assert (singles.n == 1).all()
-    np.testing.assert_array_equal(film_of(singles), film_of(table))
 
 
 @given(SEEDS, st.sampled_from([*PATTERNS, None]), st.integers(0, 10**12))
@@ -147,15 +122,6 @@ def test_full_light_is_finite_and_no_brighter_than_the_full_well(
     assert (image <= well / 2.0 * (1 + 1e-6)).all()
 
 
-@given(st.floats(0.5, 64), st.floats(1e-9, 1e3), st.floats(1e-4, 1))
-def test_exposure_goes_with_time_area_and_the_square_of_the_aperture(f, time, pixel) -> None:
-    one = photons_per_radiance(Exposure(f_number=f, time_s=time), pixel)
-    assert 0 < one < math.inf
-    assert photons_per_radiance(Exposure(f_number=f, time_s=2 * time), pixel) == pytest.approx(2 * one)
-    assert photons_per_radiance(Exposure(f_number=2 * f, time_s=time), pixel) == pytest.approx(one / 4)
-    assert photons_per_radiance(Exposure(f_number=f, time_s=time), 2 * pixel) == pytest.approx(4 * one)
-
-
 # Cameras
 
 
@@ -187,13 +153,6 @@ def test_a_ray_through_a_point_of_the_film_leads_back_to_it(grid, row, col, z_mm
         np.testing.assert_allclose(from_middle + middle, [col, row], rtol=1e-6, atol=1e-5)
 
 
-@given(st.tuples(*[st.floats(-720, 720)] * 3))
-def test_a_turn_keeps_lengths_and_handedness(angles: tuple[float, float, float]) -> None:
-    rotation = turn(np.array(angles))
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(rotation) == pytest.approx(1)
-
-
 @given(grids, st.floats(0.1, 50), st.floats(10, 1e4), st.floats(-9, 9), st.floats(-9, 9), SHARES, SHARES)
 def test_rays_of_a_lens_meet_where_it_is_in_focus(grid, aperture, focus, row, col, u, v) -> None:
     lens = Lens(aperture_mm=aperture, focus_mm=focus)
@@ -202,14 +161,6 @@ def test_rays_of_a_lens_meet_where_it_is_in_focus(grid, aperture, focus, row, co
     bent = slopes_behind_lens(chief, lens, point)
     for axis in (0, 1):
         assert point[axis] + focus * bent[axis] == pytest.approx(focus * chief[axis], abs=1e-9 * focus)
-
-
-@given(grids, st.floats(1, 50), st.integers(1, 8))
-def test_larger_pixels_keep_the_disparity_in_mm(grid: CameraGrid, scale: float, least: int) -> None:
-    coarse = with_larger_pixels(grid, scale, least_px=least)
-    assert min(coarse.height, coarse.width) >= least
-    fine, other = (np.array(disparities.disparities_px(g, 777.0)) * g.pixel_mm for g in (grid, coarse))
-    np.testing.assert_allclose(fine, other, rtol=1e-9, atol=1e-9)
 
 
 # Photons to be drawn
@@ -221,21 +172,6 @@ def test_points_of_the_film_are_on_the_film(grid: CameraGrid, number: int, seed:
     assert ((i >= 0) & (i < grid.height) & (j >= 0) & (j < grid.width)).all()
     assert ((view >= 0) & (view < grid.view_count)).all()
     assert number / 2 - 1 <= view.size <= 2 * number + 1
-
-
-@given(st.lists(st.integers(0, 2**60), min_size=1, max_size=8), st.integers(0, 3), st.floats(1e-6, 1))
-def test_candidates_fit_a_wavefront(missing: list[int], round_number: int, share: float) -> None:
-    found = candidates_needed(np.array(missing), round_number, share)
-    assert (found >= 16).all()
-    assert found.sum() <= max(WAVEFRONT, 16 * len(missing))
-
-
-@given(st.lists(st.integers(0, 9), max_size=50))
-def test_places_count_each_scope_from_zero(scopes: list[int]) -> None:
-    scope = np.sort(np.array(scopes, dtype=np.int64))
-    place = places(scope)
-    for one in set(scopes):
-        assert place[scope == one].tolist() == list(range(scopes.count(one)))
 
 
 @given(SEEDS, st.integers(0, 2**31), st.integers(0, 2**31))
@@ -277,17 +213,9 @@ def test_a_grid_is_what_pcii_takes_or_is_refused(values: dict) -> None:
     assert grid.camera_grid().rows == grid.rows
 
 
-@given(
-    st.floats(), st.sampled_from(["view", "channel", "scene", "exposure"]), st.lists(st.floats(), max_size=2)
-)
-def test_a_budget_is_a_number_of_photons_or_is_refused(
-    budget: float, scope: str, nested: list[float]
-) -> None:
-    values = {"scene": "two_objects", "photons": {"budget": budget, "scope": scope, "nested": nested}}
-    try:
-        photons = validate(Recipe, values, "recipe").photons
-    except InputError as fault:
-        assert "photons" in str(fault) or "exposure" in str(fault)  # noqa: PT017
-        return
-    assert 0 < photons.budget <= 1e15
-    assert all(0 < smaller < photons.budget for smaller in photons.nested)
+@given(grids, st.floats(1, 50), st.integers(1, 8))
+def test_larger_pixels_keep_the_disparity_in_mm(grid: CameraGrid, scale: float, least: int) -> None:
+    coarse = with_larger_pixels(grid, scale, least_px=least)
+    assert min(coarse.height, coarse.width) >= least
+    fine, other = (np.array(disparities.disparities_px(g, 777.0)) * g.pixel_mm for g in (grid, coarse))
+    np.testing.assert_allclose(fine, other, rtol=1e-9, atol=1e-9)

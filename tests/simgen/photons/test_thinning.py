@@ -30,7 +30,7 @@ from simgen.truth.first_hits import first_hits_of_view
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"
 # A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
-DRAWS = 100 if COMPILED else 25
+DRAWS = 40 if COMPILED else 25
 MANY = 400_000 if COMPILED else 50_000
 COLOUR_BIAS = 0.01 if COMPILED else 0.05
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
@@ -269,7 +269,7 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     drawn, log = draw_with_log(scene, 1, budget=budget)
     assert log["paths_above_bound"] <= 1e-2 * log["kept"]
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=3 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
@@ -317,13 +317,13 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
         for number in range(16)
     ]
     scene = lit(stripes)
-    counts = counted(draw(scene, 1, budget=50_000))
+    counts = counted(draw(scene, 1, budget=30_000))
     # Stripes' edges vary most within pixels: with fewer samples the rates' own noise would show.
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
-    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 50_000.0)
+    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 30_000.0)
     for colour in range(3):
         found, own = (
             counts[:, colour_of_pixel == colour].ravel(),
