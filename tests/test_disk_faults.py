@@ -16,7 +16,7 @@ from tiny import with_radiance
 
 from pcii.app import commands as pcii_commands
 from pcii.base import command_line
-from pcii.evaluation.rows import all_rows, key_of
+from pcii.evaluation.rows import key_of, read_rows
 from pcii.store.dataset_layout import MANIFEST
 from pcii.store.hashes import hash_file
 from pcii.store.results_list import read_results
@@ -65,8 +65,7 @@ def results_of(out: Path) -> Content:
 
 def rows_of(out: Path) -> Content:
     """Every row, but for the time, by its key."""
-    with all_rows(out) as rows:
-        return {key_of(row): json.dumps(row | {"seconds": 0, "date": ""}) for row in rows}
+    return {key_of(row): json.dumps(row | {"seconds": 0, "date": ""}) for row in read_rows(out)}
 
 
 def datasets_of(out: Path) -> Content:

@@ -1,7 +1,7 @@
 """The command `pcii benchmark`."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
@@ -10,6 +10,9 @@ from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection_layout import IN_FRAMES, Half
+
+if TYPE_CHECKING:
+    from pcii.evaluation.comparison import Evaluation
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
@@ -45,33 +48,25 @@ def run(
 
         pcii benchmark run three-step --data out/bench -o out/three-step
         pcii benchmark run depth:variance-sweep --data out/bench -o out/variance-sweep
-        pcii benchmark run my_module:remove --data out/bench --half development -o out/mine
-        pcii benchmark run depth:my_module:estimate --data out/bench -o out/mine
+        pcii benchmark run my_method.py:remove --data out/bench --half development -o out/my-removal
+        pcii benchmark run depth:my_module:estimate --data out/bench -o out/my-depth
 
     Parameters
     ----------
     method
-        A method of removal, or depth:NAME; or module:function, of the working directory or installed, and
-        depth:module:function.
+        A method of removal, or depth:NAME; or module:function, of the working directory or installed, or
+        file.py:function, with depth: before it for depth.
     out
         Folder for the scores: new, empty, or those of an earlier run, which is extended.
     budget
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import run_method
+    from pcii.evaluation.benchmark_scores import open_benchmark, run_method
 
     with Stages() as report:
-        result = run_method(
-            method,
-            open_benchmark(data),
-            out,
-            half=half,
-            budgets=budget,
-            executor=executor,
-            report=report,
-        )
-    _tell(out, result)
+        opened = open_benchmark(data, half)
+        evaluation = run_method(method, opened, out, budgets=budget, executor=executor, report=report)
+    _tell(out, evaluation)
 
 
 @benchmark.command
@@ -92,14 +87,13 @@ def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor
     out
         Folder for the scores: new, empty, or those of an earlier call.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import score_submission
+    from pcii.evaluation.benchmark_scores import open_benchmark, score_submission
 
     with Stages() as report:
-        result = score_submission(
-            folder, open_benchmark(data), out, half=half, executor=executor, report=report
+        evaluation = score_submission(
+            folder, open_benchmark(data, half), out, executor=executor, report=report
         )
-    _tell(out, result)
+    _tell(out, evaluation)
 
 
 @benchmark.command
@@ -124,9 +118,11 @@ def page(folder: Path, *, out: Out) -> None:
     say_next_page(out)
 
 
-def _tell(out: Path, result: dict[str, Any]) -> None:
-    groups = result["groups"]
-    scenes = {group["title"].removesuffix(IN_FRAMES) for group in groups}
-    rows = sum(group["datasets"] for group in groups)
-    say(f"{out}: scores of {rows} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
+def _tell(out: Path, evaluation: "Evaluation") -> None:
+    frame = evaluation.frame
+    scenes = {scene.removesuffix(IN_FRAMES) for scene in frame["scene"]}
+    datasets = frame["identity"].nunique()
+    for sentence in evaluation.made_again:
+        say(f"made again: {sentence}")
+    say(f"{out}: scores of {datasets} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
     say_next_page(out / "evaluation.html")

@@ -8,7 +8,7 @@ from typing import Any
 
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
-from pcii.evaluation.summary import object_planes
+from pcii.evaluation.rows import object_planes
 from pcii.evaluation.tables import METHOD, Column, Table, tabulated
 from pcii.sections.photon_statistics import saturation_loss
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pcii.evaluation.paired_tests import mean_interval
+from pcii.evaluation.summary import mean_interval
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.scoring import entropy_region
 from pcii.sections.photon_statistics import (
@@ -90,5 +90,4 @@ def _photon_groups(counts: PhotonCounts, rng: np.random.Generator) -> Iterator[t
 
 def _half_width(pseudo: np.ndarray) -> float:
     interval = mean_interval(pseudo.tolist())
-    assert interval.high is not None
     return interval.high - interval.mean

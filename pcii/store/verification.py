@@ -16,7 +16,7 @@ from pcii.store.collection_layout import (
     read_index,
 )
 from pcii.store.dataset_layout import CARD, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
-from pcii.store.evaluation_layout import EVALUATION_FOLDER, is_evaluation, read_evaluation
+from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
 from pcii.store.file_list import check_file, strays
 from pcii.store.folder_kind import FolderKind
 from pcii.store.results_list import FINISH, RESULTS, RESULTS_FOLDER, read_results
@@ -93,8 +93,8 @@ def _kind_and_document(path: Path) -> tuple[FolderKind, dict[str, Any]]:
     if not (path / MANIFEST).exists():
         if (path / RESULTS).exists():
             return RESULTS_FOLDER, read_results(path)
-        if is_evaluation(path):
-            return EVALUATION_FOLDER, read_evaluation(path)
+        if (path / ROWS).exists():
+            return EVALUATION_FOLDER, EVALUATION_FOLDER.read(path)
     return DATASET_FOLDER, read_manifest(path)
 
 

@@ -7,6 +7,8 @@ from benchmarks.photon_distance import Rates, distances
 from benchmarks.studies import demosaicing, radiance_images, section_growth, sections, skips
 from benchmarks.studies.depth_and_focus import BOUND, DEPTH, REMOVAL, _ratios, _rows
 from benchmarks.studies.photon_images import CROSSOVERS, THINNING, _crossovers, dense_name
+from pcii.evaluation.rows import frame_of
+from pcii.evaluation.summary import means
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
 BUDGET = 5.0 * 64**2
@@ -101,34 +103,21 @@ def test_a_difference_of_one_byte_is_a_difference() -> None:
 
 
 def test_results_of_an_evaluation_become_rows() -> None:
-    def mean(value: float) -> dict[str, object]:
-        return {"n": 2, "mean": value, "interval": [value / 2, 2 * value]}
-
-    group = {
-        "title": "balls",
-        "results": [
-            {
-                "budget": 100.0,
-                "method": "depth:posterior",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.1), "median_px": None},
-                "bounds": {"objects": [{"name": "ball", "depth_sigma_px": mean(0.25)}]},
-            },
-            {
-                "budget": 100.0,
-                "method": "depth:variance-sweep",
-                "seconds": mean(0.5),
-                "depth": {"bad_1px": mean(0.4)},
-            },
-            {"budget": 100.0, "method": "likelihood", "seconds": mean(1.0), "object": {"iou": mean(0.8)}},
-        ],
-    }
-    rows = _rows(group)
+    head = {"title": "balls", "recipe": "r", "identity": "1", "dataset": "balls", "budget": 100.0}
+    head |= {"seed": 1, "photons_per_view": 100.0, "seconds": 0.5}
+    bounds = {"objects": [{"name": "ball", "depth_sigma_px": 0.25}]}
+    planes = [{"z_mm": 1.0, "truth": "object", "object": "ball", "iou": 0.8}]
+    measured = [
+        {"method": "depth:posterior", "depth": {"bad_1px": 0.1, "median_px": None}, "bounds": bounds},
+        {"method": "depth:variance-sweep", "depth": {"bad_1px": 0.4}},
+        {"method": "likelihood", "planes": planes, "objects": []},
+    ]
+    rows = _rows(means(frame_of([head | row for row in measured])))
     assert [row.table for row in rows] == [DEPTH, DEPTH, REMOVAL, BOUND]
-    assert rows[0].values["time_ms"].high == 1000
+    assert (rows[0].values["time_ms"].value, rows[0].values["time_ms"].high) == (500, None)
     assert rows[0].values["bad_1px_percent"].value == 10
     assert "median_px" not in rows[0].values
-    assert rows[3].parameters["object"] == "ball"
+    assert rows[3].values["sigma_px"].value == 0.25
     (ratio,) = _ratios(rows)
     assert ratio.name == "balls, 100 photons: errors of the better sweep against depth:posterior"
     assert ratio.ratio.value == pytest.approx(4)
