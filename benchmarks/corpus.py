@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from benchmarks.drawn import KINDS, TUNING, write_recipe
 from pcii.base.errors import InputError
@@ -182,7 +182,8 @@ def by_half_and_kind(
     both = pd.concat([own.assign(kind="all"), own])
     lights = [light for light in own["light"].cat.categories if light in set(own["light"])]
     rows: list[tuple[str, ...]] = []
-    for names, of_names in both.groupby(["half", "kind", "method"]):
+    groups: Any = both.groupby(["half", "kind", "method"])
+    for names, of_names in groups:
         cells = dict(list(of_names.groupby("light", observed=True)))
         shown = [words(cells[light]) if light in cells else "–" for light in lights]
         rows.append((*names, str(of_names["scene"].nunique()), *shown))

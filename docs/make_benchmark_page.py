@@ -19,7 +19,7 @@ from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import by_scene
 from pcii.evaluation.rows import frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import means
+from pcii.evaluation.summary import lines_of, means
 from pcii.evaluation.tables import with_interval
 from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS
@@ -77,7 +77,7 @@ def falls(table: pd.DataFrame) -> Iterator[str]:
     """A line for each fall of the likelihood method's IoU to the next larger budget."""
     own = table[(table["method"] == METHOD) & (table["measure"] == "iou")]
     for scene, rows in own.groupby("scene", observed=True):
-        for before, after in itertools.pairwise(rows.sort_values("light").itertuples()):
+        for before, after in itertools.pairwise(lines_of(rows.sort_values("light"))):
             if before.mean - after.mean > FALL:
                 ends = " to ".join(with_interval(row.mean, row.low, row.high, 2) for row in (before, after))
                 yield f"- `{scene}`: {ends} at {after.light:g}"

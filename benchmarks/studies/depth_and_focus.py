@@ -18,6 +18,7 @@ from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
+from pcii.evaluation.summary import lines_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,8 +88,9 @@ def _rows(means: "DataFrame") -> list[Row]:
     """Rows of every scene, light and method, and of the bounds."""
     rows: list[Row] = []
     bounds: dict[tuple[str, float], Row] = {}
-    for (scene, light, method), own in means.groupby(["scene", "light", "method"], observed=True):
-        of = {row.measure: row for row in own.itertuples()}
+    groups: Any = means.groupby(["scene", "light", "method"], observed=True)
+    for (scene, light, method), own in groups:
+        of = {row.measure: row for row in lines_of(own)}
         where: dict[str, Parameter] = {"scene": scene, "photons_per_view": float(light)}
         is_depth = estimator_of(method) is not None
         columns = {"time_ms": "seconds"} | (MEASURES if is_depth else MASKS)

@@ -14,7 +14,7 @@ from pcii.evaluation.pages import page, plot_results
 from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import Kind, mean_interval, means, ranks
+from pcii.evaluation.summary import Kind, lines_of, mean_interval, means, ranks
 from pcii.evaluation.tables import TITLES, Table, light_name, rank_table, with_interval
 from pcii.figures.pictures import uri_of
 from pcii.store.collection_layout import IN_FRAMES
@@ -165,12 +165,14 @@ def _over_scenes(comparison: Comparison, values: "DataFrame") -> "DataFrame":
 
     rows: list[dict[str, Any]] = []
     for (light, method), own in values.groupby(["light", "method"], observed=True):
-        kinds: dict[str, Kind] = {"value": "share" if comparison.is_share else "geometric"}
-        for column, kind in (kinds | {"photons_per_view": "positive", "seconds": "positive"}).items():
+        kinds: dict[str, Kind] = {"photons_per_view": "positive", "seconds": "positive"}
+        kinds["value"] = "share" if comparison.is_share else "geometric"
+        for column, kind in kinds.items():
             known = own[column].dropna()
             if len(known):
                 measure = comparison.measure if column == "value" else column
-                mean = mean_interval(known.clip(lower=MIN_PX) if kind == "geometric" else known, kind)
+                known = known.clip(lower=MIN_PX) if kind == "geometric" else known
+                mean = mean_interval(known.to_list(), kind)
                 rows.append({"light": light, "method": method, "measure": measure, **mean._asdict()})
     return pd.DataFrame(rows)
 
@@ -180,7 +182,7 @@ def _table_by_light(comparison: Comparison, over_scenes: "DataFrame", lines: lis
 
     Where it has the measure of fewer than all `scenes` their number is said.
     """
-    cells = {(row.method, row.light, row.measure): row for row in over_scenes.itertuples()}
+    cells = {(row.method, row.light, row.measure): row for row in lines_of(over_scenes)}
     lights = list(over_scenes["light"].unique())
     rows = []
     for method in lines:

@@ -15,7 +15,7 @@ import numpy as np
 from pcii.base.plain_text import in_markdown, visible
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.plots import accuracy_plots, calibration_plots
-from pcii.evaluation.summary import SIGNS, means, ranks
+from pcii.evaluation.summary import SIGNS, lines_of, means, ranks
 from pcii.evaluation.tables import DEPTH, REMOVAL, Table, markdown, tables_of_all, tables_of_scene
 from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
 from pcii.store.file_list import list_files
@@ -144,7 +144,7 @@ def _over_scenes(frame: "DataFrame", ranked: Mapping[str, "DataFrame"]) -> "Data
 def plot_results(table: "DataFrame", measure: str) -> list[dict[str, Any]]:
     """Results as `plots` takes them, of a table of means by method and light, where they have a measure."""
     cells: dict[tuple[str, Any], dict[str, Any]] = {}
-    for row in table.itertuples():
+    for row in lines_of(table):
         interval = None if np.isnan(row.low) else [row.low, row.high]
         cells.setdefault((row.method, row.light), {})[row.measure] = {"mean": row.mean, "interval": interval}
     return [

@@ -3,22 +3,10 @@
 rows.jsonl has one JSON object for each dataset, light and method. What is measured again, since other
 software made it, is added below, and the last row counts.
 
-The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map:
-
-scene             title of the datasets' recipe; where several recipes share it, with what differs
-light             photons of the budget, "by exposure", or "full-light" for radiance; in the order of light
-method, dataset   names of the method and of the dataset's folder
-seed, identity    seed and identity of the dataset
-recipe            hash of the recipe without its seed
-z_mm, objects     depth of the plane and names of its objects; NaN and None of depth maps
-photons_per_view  mean of what was counted
-seconds           wall time of the method
-iou, ...          scores of masks against the objects of the plane, as in `Score.planes`
-pixel_iou, ...    scores of masks against the points within 1 px of blur
-entropy_gap_bits  entropy of the plane's objects at the best other plane minus that at their own (Table 1 of
-                  Muniraj et al. 2017): above 0 as in the paper; the least of the objects
-bad_1px, ...      errors of depth, as in `Score.depth`, with dots for what is nested: hci_objects.badpix_007
-bound_px          Cramér-Rao bound on the depth of an object as a whole, the median of the objects
+The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
+docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the other
+scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of blur,
+`entropy_gap_bits`, `bad_1px` and the other errors of depth, with dots for what is nested, and `bound_px`.
 """
 
 import json

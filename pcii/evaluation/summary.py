@@ -4,7 +4,7 @@ All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -118,6 +118,11 @@ def kind_of(measure: str) -> Kind:
     """What interval the mean of a measure has."""
     name = measure.removeprefix("pixel_").rpartition(".")[2]
     return "share" if name in SHARES else "signed" if name in SIGNED else "positive"
+
+
+def lines_of(table: "DataFrame") -> list[Any]:
+    """The rows of a table, each with its columns as attributes."""
+    return list(table.itertuples())
 
 
 def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":

@@ -8,7 +8,7 @@ import numpy as np
 
 from pcii.base.plain_text import in_markdown
 from pcii.evaluation.rows import EXPOSURE
-from pcii.evaluation.summary import CELL, SIGNS, means, ranks
+from pcii.evaluation.summary import CELL, SIGNS, lines_of, means, ranks
 from pcii.store.dataset import FULL_LIGHT, Budget
 
 if TYPE_CHECKING:
@@ -192,7 +192,7 @@ def rank_table(table: "DataFrame", measure: str, title: str, unit: str = "scenes
             *("–" if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
             str(row.n),
         )
-        for row in table.itertuples()
+        for row in lines_of(table)
     ]
     header = ("method", "photons", "rank", f"mean {NAMES[measure]}", "minus that of the best")
     header += ("p", "least p possible", unit)

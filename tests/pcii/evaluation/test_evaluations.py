@@ -81,7 +81,8 @@ def test_every_figure_by_hand(evaluated: Evaluation) -> None:
     assert len(frame) == 3 * 2 * 2 * 2
     assert frame["light"].cat.categories.tolist() == [NESTED, OWN]
     assert set(frame["scene"]) == {"by hand"}
-    own = frame[(frame["light"] == OWN) & (frame["method"] == "by count")].set_index(["z_mm", "seed"])
+    is_own = (frame["light"] == OWN) & (frame["method"] == "by count")
+    own: Any = frame[is_own].set_index(["z_mm", "seed"])
     assert own.loc[1.0, "iou"].to_dict() == {3: 0.6, 4: 0.8, 5: 0.7}
     assert own.loc[2.0, "iou"].to_dict() == {3: 1.0, 4: 1.0, 5: 1.0}
     assert own.loc[1.0, "objects"].tolist() == ["near"] * 3
@@ -217,6 +218,11 @@ def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, ca
     assert read_rows(tmp_path / "out")[:6] == first
 
 
+def check_same_but_for_seconds(one: Evaluation, other: Evaluation) -> None:
+    first, second = (each.frame.drop(columns="seconds") for each in (one, other))
+    pd.testing.assert_frame_equal(first, second)
+
+
 def near_plane(data: Any, z_range_mm: tuple[float, float]) -> DepthMap:
     return DepthMap(np.ones((8, 12)), np.ones((8, 12)))
 
@@ -230,8 +236,7 @@ def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path:
     assert mean_of(evaluation, OWN, "rows", "iou").mean == pytest.approx(10 / 48)
     assert mean_of(evaluation, OWN, "depth:near", "bad_1px").mean == 0.5
     shared = evaluate([series], tmp_path / "out", **asked, executor=Executor(2))
-    without_seconds = [each.frame.drop(columns="seconds") for each in (shared, evaluation)]
-    pd.testing.assert_frame_equal(*without_seconds)
+    check_same_but_for_seconds(shared, evaluation)
     # Nobody knows what they follow from, so they are measured whenever they are named.
     again = evaluate([series], tmp_path / "out", **asked).made_again
     assert again == ("9 scores of by_count, depth:near, rows, since what makes them is not known",)
@@ -289,7 +294,7 @@ def test_a_killed_evaluation_goes_on_where_it_was(
     (out / ROWS).write_bytes(b"\n".join(lines) + b"\n" + last[:left])  # killed in the middle of a line
     again = evaluate([evaluated.folder.parent / "data"], out, methods=FAKES)
     assert len(calls) == 2  # the torn row, and its warm-up
-    pd.testing.assert_frame_equal(*(each.frame.drop(columns="seconds") for each in (again, evaluated)))
+    check_same_but_for_seconds(again, evaluated)
     assert len((out / ROWS).read_bytes().splitlines()) == len(lines) + 1
 
 
@@ -332,14 +337,15 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
 ) -> None:
     out = tmp_path / "out"
     (tmp_path / "empty").mkdir()
-    for sentence, datasets, options in (
-        ("no photons of budget 7", [series], {"budgets": [7]}),
-        ("no such dataset folder", [tmp_path / "nowhere"], {}),
-        ("neither a finished dataset nor", [tmp_path / "empty"], {}),
-        ("at least one", [], {}),
+    for sentence, datasets in (
+        ("no such dataset folder", [tmp_path / "nowhere"]),
+        ("neither a finished dataset nor", [tmp_path / "empty"]),
+        ("at least one", []),
     ):
         with pytest.raises(InputError, match=sentence):
-            evaluate(datasets, out, methods=FAKES, **options)
+            evaluate(datasets, out, methods=FAKES)
+    with pytest.raises(InputError, match="no photons of budget 7"):
+        evaluate([series], out, methods=FAKES, budgets=[7])
     with pytest.raises(InputError, match="holds something else"):
         evaluate([series], series, methods=FAKES)
     manifest = read_manifest(series / "seed_3")
