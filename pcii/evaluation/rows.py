@@ -4,9 +4,9 @@ rows.jsonl has one JSON object for each dataset, light and method. What is measu
 software made it, is added below, and the last row counts.
 
 The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
-docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the other
-scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of blur,
-`entropy_gap_bits`, `bad_1px` and the other errors of depth, with dots for what is nested, and `bound_px`.
+docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
+other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
+blur, `entropy_gap_bits`, `bad_1px` and the other errors of depth, with dots for what is nested, `bound_px`.
 """
 
 import json
