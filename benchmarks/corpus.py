@@ -13,29 +13,29 @@ BENCH_OUT      where datasets and scores are kept, out/benchmark; what is there 
 """
 
 import os
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 from benchmarks.drawn import KINDS, TUNING, write_recipe
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
 from pcii.base.progress import Report, Stages
-from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.comparison import Evaluation, evaluate
 from pcii.evaluation.rows import recipe_of
-from pcii.evaluation.tables import Table
+from pcii.evaluation.tables import Table, light_name
 from pcii.store.dataset_layout import read_manifest
 from simgen.base.strict_models import Strict, read_toml, validate
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe
 from simgen.spec.sweeps import load_sweep
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 CORPUS = Path(__file__).with_name("corpus.toml")
 BUDGETS = "30 100 300 1000 3000 10000 300000"
-Group = Mapping[str, Any]
-Figure = TypeVar("Figure")
 
 
 class Entry(Strict):
@@ -145,8 +145,8 @@ def make(works: Sequence[Work], report: Report) -> None:
         report("datasets", done, len(works))
 
 
-def evaluated(folder: str, methods: Sequence[str]) -> tuple[dict[str, Any], dict[str, Entry]]:
-    """Make and score what is missing; gives the figures of the evaluation, and the scene of each recipe.
+def evaluated(folder: str, methods: Sequence[str]) -> tuple[Evaluation, dict[str, Entry]]:
+    """Make and score what is missing; gives the evaluation, and the scene of each recipe.
 
     The variables of this module's docstring say of what. `methods` are those without BENCH_METHODS, and
     `folder`, in BENCH_OUT, is for their scores; the datasets are the same for all tables.
@@ -167,27 +167,39 @@ def _names(text: str) -> list[str]:
 
 def by_half_and_kind(
     title: str,
-    groups: Sequence[Group],
+    evaluation: Evaluation,
     entry_of: Mapping[str, Entry],
-    figure: Callable[[Group, Group], Figure | None],
-    told: Callable[[Sequence[Figure]], str],
+    measure: str,
+    words: Callable[["DataFrame"], str],
 ) -> Table:
-    """A table of figures over the scenes of a half and kind, by method; a column for each budget.
+    """A table of a measure over the scenes of a half and kind, by method; a column for each light.
 
-    `figure` (group, row of its results) is that of a scene, and `told` says in words what scenes have.
+    `words` says in words what a table of means over seeds of several scenes has.
     """
-    found: dict[tuple[str, str, str], dict[float, list[Figure]]] = defaultdict(lambda: defaultdict(list))
-    for group in groups:
-        entry = entry_of.get(group["recipe"])
-        for row in group["results"] if entry is not None else ():
-            value = figure(group, row)
-            if entry is not None and value is not None:
-                for kind in (entry.kind, "all"):
-                    found[entry.half, kind, row["method"]][row["budget"]].append(value)
-    budgets = sorted({budget for cells in found.values() for budget in cells})
+    import pandas as pd
+
+    own = scene_means(evaluation, entry_of, measure)
+    both = pd.concat([own.assign(kind="all"), own])
+    lights = [light for light in own["light"].cat.categories if light in set(own["light"])]
     rows: list[tuple[str, ...]] = []
-    for names, cells in sorted(found.items()):
-        shown = [told(cells[budget]) if cells[budget] else "–" for budget in budgets]
-        rows.append((*names, str(max(len(values) for values in cells.values())), *shown))
-    header = ("half", "kind", "method", "scenes", *(f"{budget:g}" for budget in budgets))
+    groups: Any = both.groupby(["half", "kind", "method"])
+    for names, of_names in groups:
+        cells = dict(list(of_names.groupby("light", observed=True)))
+        shown = [words(cells[light]) if light in cells else "–" for light in lights]
+        rows.append((*names, str(of_names["scene"].nunique()), *shown))
+    header = ("half", "kind", "method", "scenes", *map(light_name, lights))
     return Table(title, header, tuple(rows), words=3)
+
+
+def scene_means(evaluation: Evaluation, entry_of: Mapping[str, Entry], measure: str) -> "DataFrame":
+    """Means over seeds of a measure, with `half`, `kind` and `name` of the scenes that are in the corpus."""
+    means, frame = evaluation.means(), evaluation.frame
+    recipes = dict(zip(frame["scene"], frame["recipe"], strict=True))
+    entries = {scene: entry_of[recipe] for scene, recipe in recipes.items() if recipe in entry_of}
+    own = means[(means["measure"] == measure) & means["scene"].isin(list(entries))]
+    return own.assign(
+        **{
+            name: [getattr(entries[scene], name) for scene in own["scene"]]
+            for name in ("half", "kind", "name")
+        }
+    )

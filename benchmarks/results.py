@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_json_safely
-from pcii.evaluation.paired_tests import positive_mean_interval
+from pcii.evaluation.summary import mean_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,8 +134,8 @@ def mean_of(samples: Iterable[float]) -> Value:
 
     The interval is Student's of the mean's logarithm, so that it stays above 0.
     """
-    mean = positive_mean_interval(list(samples))
-    return Value(mean.mean, mean.low, mean.high)
+    mean = mean_interval(list(samples), "positive")
+    return Value(mean.mean) if mean.n == 1 else Value(mean.mean, mean.low, mean.high)
 
 
 def write_record(folder: Path, record: Record) -> None:

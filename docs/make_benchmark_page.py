@@ -6,24 +6,24 @@ run` wrote on the test half of the benchmark; MACHINE is a few words on where it
 
 import itertools
 import sys
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import matplotlib
-import numpy as np
+import pandas as pd
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from pcii.evaluation.benchmark_page import write_page
-from pcii.evaluation.submission_checks import SUBMISSION
+from pcii.evaluation.benchmark_scores import by_scene
+from pcii.evaluation.rows import frame_of, read_rows
+from pcii.evaluation.submissions import SUBMISSION
+from pcii.evaluation.summary import lines_of, means
 from pcii.evaluation.tables import with_interval
 from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
 from pcii.store.collection import IN_FRAMES
-from pcii.store.folders import read_evaluation
 from simgen.dataset.benchmark_making import load_definition
 
 BENCHMARK = "pcii-bench-1"
@@ -51,7 +51,6 @@ By more than {fall:g} in the mean over draws; in brackets the 95 % interval, wid
 {falls}
 """
 FALL = 0.02
-Results = dict[str, list[Mapping[str, Any]]]
 
 
 def main(submissions: Path, machine: str) -> None:
@@ -59,51 +58,46 @@ def main(submissions: Path, machine: str) -> None:
     page = f"{BENCHMARK}.html"
     write_page(submissions, DOCS / page)
     kinds = {scene.name: scene.kind for scene in load_definition(BENCHMARK)[0].scene}
-    of_scene = results(submissions)
-    found = "\n".join(falls(of_scene)) or "- nowhere"
+    table = results(submissions)
+    found = "\n".join(falls(table)) or "- nowhere"
     text = PAGE.format(page=page, machine=machine, falls=found, fall=FALL)
     (DOCS / "experiments" / "removal_scores.md").write_text(text, encoding="utf-8")
-    draw(of_scene, kinds, DOCS / "experiments" / "removal_scores.jpg")
+    draw(table, kinds, DOCS / "experiments" / "removal_scores.jpg")
 
 
-def results(submissions: Path) -> Results:
-    """What was measured of removal by scene, in order of photons; without binary frames."""
-    found = defaultdict[str, list[Mapping[str, Any]]](list)
-    for file in sorted(submissions.glob(f"*/{SUBMISSION}")):
-        for group in read_evaluation(file.parent)["groups"]:
-            rows = [row for row in group["results"] if row.get("object", {}).get("iou")]
-            if rows and not group["title"].endswith(IN_FRAMES):
-                found[group["title"]] += sorted(rows, key=lambda row: row["budget"])
-    return found
+def results(submissions: Path) -> pd.DataFrame:
+    """Means over draws of what was measured of removal, without binary frames: see `summary.means`."""
+    rows = [row for file in sorted(submissions.glob(f"*/{SUBMISSION}")) for row in read_rows(file.parent)]
+    table = means(frame_of(by_scene(rows)))
+    methods = table["method"][table["measure"] == "iou"].unique()
+    return table[table["method"].isin(methods) & ~table["scene"].astype(str).str.endswith(IN_FRAMES)]
 
 
-def falls(of_scene: Results) -> Iterator[str]:
+def falls(table: pd.DataFrame) -> Iterator[str]:
     """A line for each fall of the likelihood method's IoU to the next larger budget."""
-    for scene, rows in of_scene.items():
-        ious = [(row["budget"], row["object"]["iou"]) for row in rows if row["method"] == METHOD]
-        for (_, before), (budget, after) in itertools.pairwise(ious):
-            if before["mean"] - after["mean"] > FALL:
-                ends = f"{with_interval(before, 2)} to {with_interval(after, 2)}"
-                yield f"- `{scene}`: {ends} at {budget:g}"
+    own = table[(table["method"] == METHOD) & (table["measure"] == "iou")]
+    for scene, rows in own.groupby("scene", observed=True):
+        for before, after in itertools.pairwise(lines_of(rows.sort_values("light"))):
+            if before.mean - after.mean > FALL:
+                ends = " to ".join(with_interval(row.mean, row.low, row.high, 2) for row in (before, after))
+                yield f"- `{scene}`: {ends} at {after.light:g}"
 
 
-def draw(of_scene: Results, kinds: Mapping[str, str], file: Path) -> None:
+def draw(table: pd.DataFrame, kinds: Mapping[str, str], file: Path) -> None:
     """Mean IoU of each kind against photons (above) and against seconds (below)."""
-    shown = [
-        kind for kind in dict.fromkeys(kinds.values()) if any(kinds[scene] == kind for scene in of_scene)
-    ]
+    values = table.pivot(index=["scene", "method", "light"], columns="measure", values="mean").reset_index()
+    values["kind"] = [kinds[scene] for scene in values["scene"]]
+    shown = [kind for kind in dict.fromkeys(kinds.values()) if kind in set(values["kind"])]
     figure, axes = plt.subplots(2, len(shown), figsize=(14, 5.6), sharey=True, layout="constrained")
     for column, kind in enumerate(shown):
-        own = defaultdict[str, dict[float, list[tuple[float, float]]]](lambda: defaultdict(list))
-        for scene, rows in of_scene.items():
-            for row in rows if kinds[scene] == kind else ():
-                pair = row["object"]["iou"]["mean"], row["seconds"]["mean"]
-                own[row["method"]][row["budget"]].append(pair)
-        for number, (method, by_budget) in enumerate(sorted(own.items())):
-            iou, seconds = np.array([np.mean(pairs, axis=0) for pairs in by_budget.values()]).T
+        of_kind = values[values["kind"] == kind].groupby(["method", "light"], observed=True)
+        of_methods = of_kind[["iou", "seconds"]].mean().groupby(level="method")
+        for number, (method, own) in enumerate(of_methods):
             style = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 4, "linewidth": 1.3}
-            axes[0, column].plot(list(by_budget), iou, label=method, **style)
-            axes[1, column].plot(seconds, iou, **style)
+            axes[0, column].plot(
+                own.index.get_level_values("light").to_list(), own["iou"], label=method, **style
+            )
+            axes[1, column].plot(own["seconds"], own["iou"], **style)
         axes[0, column].set(title=kind, xlabel="photons per view")
         axes[1, column].set(xlabel="seconds")
     for axis in axes.flat:

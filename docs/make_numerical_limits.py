@@ -39,7 +39,7 @@ NO_NUMBERS = {
     "FocalPlanes": "checked as `z_mm` of `reconstruct` is",
     "TrueFocus": "made of a `Truth`",
     "mean_interval": "means of scores",
-    "paired_difference": "means of scores",
+    "sign_flip_p": "means of scores",
     "verify": "reads a folder",
     "InputError": "the refusal itself",
     "ViewOrder": "four switches",

@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.paired_tests import mean_interval, paired_difference
+from pcii.evaluation.summary import mean_interval, sign_flip_p
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
@@ -71,7 +71,6 @@ __all__ = [
     "mean_interval",
     "open_collection",
     "open_dataset",
-    "paired_difference",
     "reconstruct",
     "reconstruct_each",
     "removal_methods",
@@ -79,6 +78,7 @@ __all__ = [
     "save_dataset",
     "score",
     "segment",
+    "sign_flip_p",
     "srgb_to_linear",
     "verify",
 ]

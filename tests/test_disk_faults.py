@@ -16,8 +16,9 @@ from tiny import with_radiance
 
 from pcii.app import commands as pcii_commands
 from pcii.base import command_line
+from pcii.evaluation.rows import key_of, read_rows
 from pcii.store.dataset_layout import MANIFEST
-from pcii.store.folders import ROWS, hash_file, read_results
+from pcii.store.folders import hash_file, read_results
 from pcii.store.verification import verify
 from simgen.app import commands as simgen_commands
 
@@ -54,12 +55,8 @@ def results_of(out: Path) -> Content:
 
 
 def rows_of(out: Path) -> Content:
-    """Every row, but for the time, by dataset, budget and method."""
-    rows = [json.loads(line) for line in (out / ROWS).read_bytes().split(b"\n")[:-1]]
-    return {
-        (row["identity"], row["budget"], row["method"]): json.dumps(row | {"seconds": 0, "date": ""})
-        for row in rows
-    }
+    """Every row, but for the time, by its key."""
+    return {key_of(row): json.dumps(row | {"seconds": 0, "date": ""}) for row in read_rows(out)}
 
 
 def datasets_of(out: Path) -> Content:

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from benchmarks.corpus import load_corpus, make, named_scenes, work_list
 from benchmarks.figures import curve, frame
 from benchmarks.results import Measured, Parameter, Ratio, Row, Size, Study, Value
@@ -16,23 +18,25 @@ from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
+from pcii.evaluation.summary import lines_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 DEPTH, REMOVAL, BOUND = "Depth", "Removal of defocused points", "Least error of the depth of whole objects"
 MEASURES = {
-    "median_px": ("depth", "median_px"),
-    "bad_1px_percent": ("depth", "bad_1px"),
-    "badpix_007_percent": ("depth", "hci_objects", "badpix_007"),
-    "mse_x100": ("depth", "hci_objects", "mse_x100"),
-    "answered_percent": ("depth", "coverage"),
+    "median_px": "median_px",
+    "bad_1px_percent": "bad_1px",
+    "badpix_007_percent": "hci_objects.badpix_007",
+    "mse_x100": "hci_objects.mse_x100",
+    "answered_percent": "coverage",
 }
 """Columns of depth: errors of total disparity on objects, and metrics of the HCI benchmark there."""
 MASKS = {
-    "iou": ("object", "iou"),
-    "boundary_f": ("object", "boundary_f"),
-    "iou_of_oracle": ("pixel", "iou_oracle"),
+    "iou": "iou",
+    "boundary_f": "boundary_f",
+    "iou_of_oracle": "pixel_iou_oracle",
 }
 DEFAULT, SWEEPS = depth_name("posterior"), (depth_name("likelihood-sweep"), depth_name("variance-sweep"))
 NOT_WORSE = 1.0
@@ -76,45 +80,33 @@ def measure(
         folders = [work.folder for work in works]
         scores = Path(folder) / "scores"
         evaluation = evaluate(folders, scores, methods=methods, budgets=budgets, report=progress)
-    found = [row for group in evaluation["groups"] for row in _rows(group)]
+    found = _rows(evaluation.means())
     return Measured(found, _ratios(found), sorted({work.recipe.seed for work in works}))
 
 
-def _rows(group: Mapping[str, Any]) -> list[Row]:
-    """Rows of one scene."""
+def _rows(means: "DataFrame") -> list[Row]:
+    """Rows of every scene, light and method, and of the bounds."""
     rows: list[Row] = []
-    bounds: dict[tuple[float, str], Row] = {}
-    for result in group["results"]:
-        where: dict[str, Parameter] = {"scene": group["title"], "photons_per_view": float(result["budget"])}
-        is_depth = estimator_of(result["method"]) is not None
-        values = {"time_ms": _value(result["seconds"], 1e3)}
-        for name, path in (MEASURES if is_depth else MASKS).items():
-            value = _value(_at(result, path), 100 if name.endswith("percent") else 1)
-            if value is not None:
-                values[name] = value
-        known = {name: value for name, value in values.items() if value is not None}
-        rows.append(Row(DEPTH if is_depth else REMOVAL, result["method"], where, known))
-        for bound in result.get("bounds", {}).get("objects", ()):
-            sigma = _value(bound["depth_sigma_px"])
-            if sigma is not None:
-                parameters = where | {"object": bound["name"]}
-                row = Row(BOUND, "Cramer-Rao bound", parameters, {"sigma_px": sigma})
-                bounds.setdefault((result["budget"], bound["name"]), row)
+    bounds: dict[tuple[str, float], Row] = {}
+    groups: Any = means.groupby(["scene", "light", "method"], observed=True)
+    for (scene, light, method), own in groups:
+        of = {row.measure: row for row in lines_of(own)}
+        where: dict[str, Parameter] = {"scene": scene, "photons_per_view": float(light)}
+        is_depth = estimator_of(method) is not None
+        columns = {"time_ms": "seconds"} | (MEASURES if is_depth else MASKS)
+        scales = {
+            name: 1e3 if name == "time_ms" else 100 if name.endswith("percent") else 1 for name in columns
+        }
+        values = {name: _value(of[key], scales[name]) for name, key in columns.items() if key in of}
+        rows.append(Row(DEPTH if is_depth else REMOVAL, method, where, values))
+        if "bound_px" in of:
+            bounds[scene, light] = Row(BOUND, "Cramer-Rao bound", where, {"sigma_px": _value(of["bound_px"])})
     return [*rows, *bounds.values()]
 
 
-def _at(result: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any] | None:
-    found: Any = result
-    for name in path:
-        found = None if found is None else found.get(name)
-    return found
-
-
-def _value(mean: Mapping[str, Any] | None, scale: float = 1.0) -> Value | None:
-    if mean is None:
-        return None
-    low, high = mean["interval"] or (None, None)
-    return Value(scale * mean["mean"], low and scale * low, high and scale * high)
+def _value(row: Any, scale: float = 1.0) -> Value:
+    low, high = (None if np.isnan(end) else scale * end for end in (row.low, row.high))
+    return Value(scale * row.mean, low, high)
 
 
 def _ratios(rows: list[Row]) -> list[Ratio]:
@@ -150,11 +142,7 @@ def draw(figure: "Figure", measured: Measured) -> None:
         for number, method in enumerate(dict.fromkeys(row.name for row in rows)):
             curve(axes, [row for row in rows if row.name == method], x, y, method, number)
         if y == "median_px":
-            for number, name in enumerate(
-                dict.fromkeys(row.parameters["object"] for row in measured.of(BOUND, scene=scene))
-            ):
-                own = measured.of(BOUND, scene=scene, object=name)
-                curve(axes, own, x, "sigma_px", f"bound, all of {name}", 7 + number)
+            curve(axes, measured.of(BOUND, scene=scene), x, "sigma_px", "bound of whole objects", 7)
         frame(axes, x, y, f"{table}: {scene}", log="xy" if y == "median_px" else "x")
 
 

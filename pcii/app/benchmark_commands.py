@@ -1,7 +1,7 @@
 """The command `pcii benchmark`."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
@@ -9,9 +9,9 @@ from pcii.app.command_options import Out
 from pcii.base.command_line import say, say_next_page
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
-from pcii.evaluation.benchmark_collection import open_benchmark
 from pcii.evaluation.benchmark_page import write_page
-from pcii.evaluation.submission_scores import run_method, score_submission
+from pcii.evaluation.benchmark_scores import open_benchmark, run_method, score_submission
+from pcii.evaluation.comparison import Evaluation
 from pcii.store.collection import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
@@ -48,7 +48,9 @@ def run(
     Examples of use:
 
         pcii benchmark run three-step --data out/bench -o out/three-step
-        pcii benchmark run depth:variance-sweep --data out/bench --half development -o out/variance-sweep
+        pcii benchmark run depth:variance-sweep --data out/bench -o out/variance-sweep
+        pcii benchmark run my_method.py:remove --data out/bench --half development -o out/my-removal
+        pcii benchmark run depth:my_module:estimate --data out/bench -o out/my-depth
 
     Parameters
     ----------
@@ -58,8 +60,9 @@ def run(
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
     with Stages() as report:
-        options = {"half": half, "budgets": budget, "executor": executor, "report": report}
-        _say_scores(out, run_method(method, open_benchmark(data), out, **options))
+        opened = open_benchmark(data, half)
+        evaluation = run_method(method, opened, out, budgets=budget, executor=executor, report=report)
+    _tell(out, evaluation)
 
 
 @benchmark.command
@@ -81,8 +84,10 @@ def score(
         Folder of the results.
     """
     with Stages() as report:
-        options = {"half": half, "executor": executor, "report": report}
-        _say_scores(out, score_submission(folder, open_benchmark(data), out, **options))
+        evaluation = score_submission(
+            folder, open_benchmark(data, half), out, executor=executor, report=report
+        )
+    _tell(out, evaluation)
 
 
 @benchmark.command
@@ -105,9 +110,11 @@ def page(folder: Path, *, out: Out) -> None:
     say_next_page(out)
 
 
-def _say_scores(out: Path, result: dict[str, Any]) -> None:
-    groups = result["groups"]
-    scenes = {group["title"].removesuffix(IN_FRAMES) for group in groups}
-    rows = sum(group["datasets"] for group in groups)
-    say(f"{out}: scores of {rows} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
+def _tell(out: Path, evaluation: Evaluation) -> None:
+    frame = evaluation.frame
+    scenes = {scene.removesuffix(IN_FRAMES) for scene in frame["scene"]}
+    datasets = frame["identity"].nunique()
+    for sentence in evaluation.made_again:
+        say(f"made again: {sentence}")
+    say(f"{out}: scores of {datasets} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
     say_next_page(out / "evaluation.html")

@@ -56,8 +56,8 @@ def evaluate(
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
-    Writes evaluation.json, evaluation.html and evaluation.md, and each score, as it is measured, to
-    rows.jsonl. Scores that other software made are made again.
+    Writes evaluation.html, evaluation.md and means.csv, and each score, as it is measured, to rows.jsonl.
+    Scores that other software made are made again.
 
     Examples of use:
 
@@ -71,8 +71,9 @@ def evaluate(
     out
         Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
-        A method of removal, as in `pcii segment`, or depth: and one as in `pcii depth` ("depth": the default
-        one); may be repeated. Default: all that can take the data.
+        A method of removal, as in `pcii segment`, or depth:NAME, as in `pcii depth` ("depth": the default
+        one); or module:function or file.py:function, with depth: before it for depth; may be repeated.
+        Default: all that can take the data.
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
     z_mm
@@ -83,11 +84,10 @@ def evaluate(
         evaluation = comparison.evaluate(
             datasets, out, methods=method, budgets=budget, z_mm=z_mm, executor=executor, report=report
         )
-    if evaluation["made"]["differing"]:
-        differing = ", ".join(evaluation["made"]["differing"])
+    if differing := ", ".join(evaluation.origin["differing"]):
         say(f"warning: not all rows are of the same software ({differing}); name all datasets and methods")
-    for again in evaluation["again"]:
-        say(f"made again: {again['rows']} scores of {', '.join(again['methods'])}, since {again['why']}")
+    for sentence in evaluation.made_again:
+        say(f"made again: {sentence}")
     say(f"report: {out / 'evaluation.html'}")
     say_next_page(out / "evaluation.html")
 

@@ -33,7 +33,6 @@ from pcii.figures.pictures import (
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.types.bayer import colours_and_samples
-from pcii.types.camera_grid import middle_camera
 from pcii.types.section_stack import Sections
 
 LONGEST_PX = 640
@@ -140,7 +139,7 @@ def _section_images(sections: Sections, crop: Crop, smoothing_px: float = 0.0) -
 def input_panels(pictures: Pictures) -> list[Panel]:
     """The view in the middle: its photons, and at full light."""
     dataset, crop = pictures.outcome.dataset, pictures.crop
-    k, l = middle_camera(dataset.grid)
+    k, l = dataset.grid.middle_camera
     panels: list[Panel] = []
     if dataset.has_counts:
         view = dataset.counts.view(k, l)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pcii.app.pipeline import Outcome
+from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.tables import Table
 
 NUMBERS = {
@@ -45,15 +46,29 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
 
 
 def entropy_table(outcome: Outcome) -> Table:
-    """Entropies of the objects at each plane (the paper's Table 1); the lowest of a row stands out."""
-    objects = [row for row in outcome.score.objects if None not in row["entropy"].values()]
-    depths = tuple(objects[0]["entropy"]) if objects else ()
-    rows = tuple((row["name"], *(f"{bits:.3f}" for bits in row["entropy"].values())) for row in objects)
+    """Entropies of the objects at each plane with their intervals (the paper's Table 1).
+
+    The lowest of a row stands out. There are no intervals of too few photons, nor of radiance.
+    """
+    objects, dataset = outcome.score.objects, outcome.dataset
+    half_widths: list[dict[str, float]] = []
+    if objects and dataset.has_counts and dataset.truth is not None:
+        half_widths = entropy_half_widths(dataset.counts, outcome.sections, dataset.truth)
+    seen = [
+        (row["name"], row["entropy"], half)
+        for row, half in zip(objects, half_widths or [{}] * len(objects), strict=True)
+        if None not in row["entropy"].values()
+    ]
+    depths = tuple(seen[0][1]) if seen else ()
+    rows = tuple(
+        (name, *(f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else "") for z, bits in entropy.items()))
+        for name, entropy, half in seen
+    )
     best = {
         (number, 1 + place)
-        for number, row in enumerate(objects)
-        for place, bits in enumerate(row["entropy"].values())
-        if len(depths) > 1 and bits == min(row["entropy"].values())
+        for number, (_, entropy, _) in enumerate(seen)
+        for place, bits in enumerate(entropy.values())
+        if len(depths) > 1 and bits == min(entropy.values())
     }
     header = ("object", *(f"{z} mm" for z in depths))
     return Table("Entropy of the objects, in bits", header, rows, best=frozenset(best))

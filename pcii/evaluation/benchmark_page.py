@@ -1,93 +1,69 @@
 """One page of all submissions in a folder: ranks, lines over light, best and worst scenes, and commands."""
 
-import json
-import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.evaluation_pages import accuracy_plots
-from pcii.evaluation.pages import page
-from pcii.evaluation.paired_tests import mean_interval, positive_mean_interval
-from pcii.evaluation.pooling import pooled_tables
-from pcii.evaluation.rows import Row, all_rows, by_light
-from pcii.evaluation.submission_checks import SUBMISSION
-from pcii.evaluation.submission_pictures import TYPICAL_PHOTONS, picture_name
-from pcii.evaluation.submission_scores import by_scene
-from pcii.evaluation.summary import summarise
-from pcii.evaluation.tables import Table, budget_name, with_interval
+from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene, picture_name, read_scores
+from pcii.evaluation.pages import accuracy_plot, page
+from pcii.evaluation.rows import Row, frame_of, read_rows
+from pcii.evaluation.submissions import SUBMISSION
+from pcii.evaluation.summary import Kind, lines_of, mean_interval, means, ranks
+from pcii.evaluation.tables import TITLES, Table, light_name, rank_table, with_interval
 from pcii.figures.pictures import uri_of
 from pcii.store.collection import IN_FRAMES
-from pcii.store.folders import read_evaluation
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 SCENES_NAMED = 3
 """So many of the best and of the worst scenes of each method are shown."""
-LEAST_PX = 1e-3
+MIN_PX = 1e-3
 """Smaller errors of depth count as this one where they are averaged as logarithms."""
 
 
 @dataclass(frozen=True)
-class Kind:
-    """What methods are compared by: the part of a result and a measure in it, and the bound on that.
+class Comparison:
+    """What methods are compared by: a measure, and the measure and name of the bound on it.
 
-    `sign` makes more better. Only those that are `pictured` show their best and worst scenes.
+    `sign` makes more better; without one there are no best and worst scenes. Means over scenes are of shares
+    or, without `is_share`, geometric.
     """
 
     title: str
-    part: str
     measure: str
     words: str
-    sign: int
+    sign: int = 0
+    bound_measure: str = ""
     bound: str = ""
     is_share: bool = True
-    pictured: bool = True
-
-    def over_scenes(self, values: Sequence[float]) -> dict[str, Any]:
-        """The mean over scenes and its interval: of shares, or the geometric one of errors in px."""
-        if self.is_share:
-            return mean_interval(values, (0.0, 1.0)).figures()
-        logs = mean_interval([math.log(max(value, LEAST_PX)) for value in values])
-        ends = None if logs.low is None or logs.high is None else [math.exp(logs.low), math.exp(logs.high)]
-        return {"n": logs.n, "mean": math.exp(logs.mean), "interval": ends}
-
-    def bound_of(self, result: Mapping[str, Any]) -> float | None:
-        """The bound at the light of a result, if there is one and the result has it."""
-        if self.part == "object":
-            oracle = result["object"].get("iou_oracle")
-            return None if oracle is None else oracle["mean"]
-        if not self.bound:
-            return None
-        objects = result.get("bounds", {}).get("objects", ())
-        known = [entry["depth_sigma_px"]["mean"] for entry in objects if entry["depth_sigma_px"]]
-        return median(known) if known else None
 
 
-KINDS = (
-    Kind(
+COMPARISONS = (
+    Comparison(
         "Removal of defocused points",
-        "object",
         "iou",
         "IoU with the objects of each plane: more is better. The oracle knows the true depth of each pixel",
         1,
+        "iou_oracle",
         "oracle (masks from the true depth)",
     ),
-    Kind("Depth", "depth", "bad_1px", "Share of pixels off by more than 1 px: less is better", -1),
-    Kind(
+    Comparison("Depth", "bad_1px", "Share of pixels off by more than 1 px: less is better", -1),
+    Comparison(
         "Error of depth",
-        "depth",
         "median_px",
         "Median error of the pixels with an answer, geometric mean over scenes: less is better. The "
         "Cramér-Rao bound is the least standard deviation of the depth of an object as a whole, given its "
         "photons and its texture; median over the objects of a scene",
-        -1,
+        0,
+        "bound_px",
         "bound for whole objects (Cramér-Rao)",
         is_share=False,
-        pictured=False,
     ),
 )
 
@@ -95,193 +71,179 @@ KINDS = (
 def write_page(folder: Path, out: Path) -> int:
     """Write the page of all submissions in a folder, each a folder of its own; returns how many there are.
 
-    Raises `InputError` for a folder without submissions, one that is not scored or was changed, two of one
-    method, and submissions of several benchmarks.
+    Raises `InputError` for a folder without submissions, one that is not scored, two of one method, and
+    submissions of several benchmarks.
     """
-    submissions = [_read(file.parent) for file in sorted(folder.glob(f"*/{SUBMISSION}"))]
-    if (folder / SUBMISSION).is_file():
-        raise InputError(f"{folder}: is a submission; name the folder that it is in")
+    submissions = {file.parent: read_scores(file.parent) for file in sorted(folder.glob(f"*/{SUBMISSION}"))}
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
-    for what in ("benchmark", "half"):
-        values = sorted({str(said[what]) for said, _ in submissions})
+    for name in ("benchmark", "half"):
+        values = sorted({about[name] for about in submissions.values()})
         if len(values) > 1:
-            raise InputError(f"{folder}: submissions are of more than one {what}: {', '.join(values)}")
-    made_by: dict[str, str] = {}
-    for said, rows in submissions:
-        for method in {row["method"] for row in rows}:
-            if method in made_by:
-                raise InputError(f"{folder}: {made_by[method]} and {said['folder']} are both of {method!r}")
-            made_by[method] = said["folder"]
-    rows = [row for _, rows in submissions for row in by_scene(rows)]
+            raise InputError(f"{folder}: submissions are of more than one {name}: {', '.join(values)}")
+    rows: list[Row] = []
+    folder_of: dict[str, Path] = {}
+    for inside in submissions:
+        own = by_scene(read_rows(inside))
+        rows += own
+        for method in {row["method"] for row in own}:
+            if folder_of.setdefault(method, inside) != inside:
+                names = f"{folder_of[method].name} and {inside.name}"
+                raise InputError(f"{folder}: {names} are both of {method!r}")
+    frame = frame_of(rows)
     # Binary frames of a scene are the same photons: they would count it twice.
-    in_frames = [row for row in rows if row["title"].endswith(IN_FRAMES)]
-    evaluation = summarise([row for row in rows if not row["title"].endswith(IN_FRAMES)])
-    groups, of_frames = evaluation["groups"], summarise(in_frames)["groups"]
-    said_of = {said["folder"]: said for said, _ in submissions}
-    folder_of = {method: folder / name for method, name in made_by.items()}
-    kinds = [part for kind in KINDS if (part := _kind(kind, groups, of_frames, folder_of)) is not None]
+    of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
+    about = next(iter(submissions.values()))
     content = {
-        "benchmark": submissions[0][0]["benchmark"],
-        "half": submissions[0][0]["half"],
-        "scenes": len(groups),
-        "kinds": kinds,
+        "benchmark": about["benchmark"],
+        "half": about["half"],
+        "scenes": of_scenes["scene"].nunique(),
+        "kinds": [
+            part for each in COMPARISONS if (part := _compare(each, frame, of_scenes, folder_of)) is not None
+        ],
         "typical": f"{TYPICAL_PHOTONS:g}",
-        "ranks": pooled_tables(evaluation),
-        "submissions": _submissions(made_by, said_of, [*groups, *of_frames]),
+        "ranks": [
+            rank_table(ranks(of_scenes, measure), measure, f"{title} over all scenes")
+            for measure, title in TITLES.items()
+        ],
+        "submissions": _submission_table(submissions, folder_of, frame),
     }
     write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
     return len(submissions)
 
 
-def _read(folder: Path) -> tuple[dict[str, Any], list[Row]]:
-    """What a submission says, its folder's name among it, and its rows."""
-    read_evaluation(folder)  # raises `InputError` if it is unfinished, or was changed
-    try:
-        said = json.loads((folder / SUBMISSION).read_text(encoding="utf-8"))
-        said = {**said, "folder": folder.name}
-        _ = said["benchmark"], said["half"], said["method"], said["made"]
-    except (ValueError, TypeError, KeyError, OSError):
-        raise InputError(f"{folder / SUBMISSION}: damaged; score the submission again") from None
-    with all_rows(folder) as rows:
-        return said, rows
-
-
-def _cells(kind: Kind, groups: Sequence[Mapping[str, Any]]) -> dict[tuple[str, Any], dict[str, Any]]:
-    """By method (or bound) and budget: its measure of each scene, and photons and seconds of all."""
-    cells: dict[tuple[str, Any], dict[str, Any]] = {}
-    for group in groups:
-        for row in group["results"]:
-            scores = row.get(kind.part, {})
-            if scores.get(kind.measure) is None:
-                continue
-            found = {row["method"]: scores[kind.measure]["mean"]}
-            if (bound := kind.bound_of(row)) is not None:
-                found[kind.bound] = bound
-            for name, value in found.items():
-                cell = cells.setdefault((name, row["budget"]), {"photons": [], "seconds": [], "of": {}})
-                cell["of"][group["title"]] = value
-                cell["photons"] += [] if row["photons_per_view"] is None else [row["photons_per_view"]]
-                if name != kind.bound and row["seconds"] is not None:
-                    cell["seconds"].append(row["seconds"]["mean"])
-    return cells
-
-
-def _kind(
-    kind: Kind,
-    groups: Sequence[Mapping[str, Any]],
-    of_frames: Sequence[Mapping[str, Any]],
-    folder_of: Mapping[str, Path],
+def _compare(
+    comparison: Comparison, frame: "DataFrame", of_scenes: "DataFrame", folder_of: Mapping[str, Path]
 ) -> dict[str, Any] | None:
-    """What the page says of methods by one measure; None if there are none.
-
-    Results of binary frames (`of_frames`) are shown scene by scene only.
-    """
-    cells = _cells(kind, groups)
-    if not cells:
+    """What the page says of methods by one measure; None if there are none."""
+    values = _values(comparison, of_scenes)
+    if not len(values):
         return None
-    results = [
-        {
-            "method": method,
-            "budget": budget,
-            "photons_per_view": _mean(cell["photons"]),
-            "seconds": positive_mean_interval(cell["seconds"]).figures() if cell["seconds"] else None,
-            kind.part: {kind.measure: kind.over_scenes([*cell["of"].values()])},
-        }
-        for (method, budget), cell in sorted(cells.items(), key=lambda item: by_light(item[0][1]))
-    ]
-    methods = sorted({method for method, _ in cells} - {kind.bound})
-    drawn = [*methods, kind.bound] if any(method == kind.bound for method, _ in cells) else methods
+    methods = sorted({*values["method"]} - {comparison.bound})
+    lines = [*methods, *({comparison.bound} & {*values["method"]})]
+    over_scenes = _over_scenes(comparison, values)
     return {
-        "title": kind.title,
-        "words": kind.words,
-        "plot": accuracy_plots({"results": results}, drawn, kind.measure),
-        "table": _over_light(kind, results, drawn, len(groups)),
-        "by_scene": _by_scene(_cells(kind, [*groups, *of_frames]), drawn),
+        "title": comparison.title,
+        "words": comparison.words,
+        "plot": accuracy_plot(over_scenes, lines, comparison.measure),
+        "table": _table_by_light(comparison, over_scenes, lines, of_scenes["scene"].nunique()),
+        "by_scene": _table_by_scene(_values(comparison, frame), lines),
         "scenes": [
-            _best_and_worst(kind, cells, method, folder_of[method])
+            _best_and_worst(comparison, values, method, folder_of[method])
             for method in methods
-            if kind.pictured and (method, TYPICAL_PHOTONS) in cells
+            if comparison.sign
         ],
     }
 
 
-def _mean(values: Sequence[float]) -> float | None:
-    return sum(values) / len(values) if values else None
+def _values(comparison: Comparison, frame: "DataFrame") -> "DataFrame":
+    """Means over seeds: `method` (or bound), `light`, `scene`, `value`, `photons_per_view`, `seconds`."""
+    import pandas as pd
+
+    keys = ["scene", "light", "method"]
+    table = means(frame).pivot(index=keys, columns="measure", values="mean").reset_index()
+    columns = [*keys, "value", "photons_per_view", "seconds"]
+    if comparison.measure not in table:
+        return pd.DataFrame(columns=columns)
+    table = table.reindex(columns=[*dict.fromkeys([*table.columns, *columns, comparison.bound_measure])])
+    table["value"] = table[comparison.measure]
+    table = table[table["value"].notna()]
+    if comparison.bound:
+        known = table[table[comparison.bound_measure].notna()].drop_duplicates(
+            ["scene", "light"], keep="last"
+        )
+        bounds = known.assign(method=comparison.bound, value=known[comparison.bound_measure], seconds=np.nan)
+        table = pd.concat([table, bounds])
+    return table[columns]
 
 
-def _over_light(
-    kind: Kind, results: Sequence[Mapping[str, Any]], methods: Sequence[str], scenes: int
-) -> Table:
+def _over_scenes(comparison: Comparison, values: "DataFrame") -> "DataFrame":
+    """Means over scenes of the measure, photons and seconds, by method and light."""
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    for (light, method), own in values.groupby(["light", "method"], observed=True):
+        kinds: dict[str, Kind] = {"photons_per_view": "positive", "seconds": "positive"}
+        kinds["value"] = "share" if comparison.is_share else "geometric"
+        for column, kind in kinds.items():
+            known = own[column].dropna()
+            if len(known):
+                measure = comparison.measure if column == "value" else column
+                known = known.clip(lower=MIN_PX) if kind == "geometric" else known
+                mean = mean_interval(known.to_list(), kind)
+                rows.append({"light": light, "method": method, "measure": measure, **mean._asdict()})
+    return pd.DataFrame(rows)
+
+
+def _table_by_light(comparison: Comparison, over_scenes: "DataFrame", lines: list[str], scenes: int) -> Table:
     """The measure of each method at each light, the mean over scenes with its interval, and its time.
 
     Where it has the measure of fewer than all `scenes` their number is said.
     """
-    found = {(row["method"], row["budget"]): row for row in results}
-    budgets = sorted({budget for _, budget in found}, key=by_light)
+    cells = {(row.method, row.light, row.measure): row for row in lines_of(over_scenes)}
+    lights = list(over_scenes["light"].unique())
     rows = []
-    for method in methods:
-        cells = [found.get((method, budget)) for budget in budgets]
-        means = [None if row is None else row[kind.part][kind.measure] for row in cells]
-        shown = [
-            with_interval(mean) + (f" of {mean['n']} scenes" if mean and mean["n"] < scenes else "")
-            for mean in means
-        ]
-        timed = found.get((method, TYPICAL_PHOTONS), {}).get("seconds")
-        rows.append((method, *shown, with_interval(timed, 2)))
-    header = ("method", *map(budget_name, budgets), f"seconds at {TYPICAL_PHOTONS:g}")
+    for method in lines:
+        texts = [method]
+        for light in lights:
+            row = cells.get((method, light, comparison.measure))
+            few = f" of {row.n} scenes" if row is not None and row.n < scenes else ""
+            texts.append("–" if row is None else with_interval(row.mean, row.low, row.high) + few)
+        row = cells.get((method, TYPICAL_PHOTONS, "seconds"))
+        texts.append("–" if row is None else with_interval(row.mean, row.low, row.high, 2))
+        rows.append(tuple(texts))
+    header = ("method", *map(light_name, lights), f"seconds at {TYPICAL_PHOTONS:g}")
     return Table("By photons per view", header, tuple(rows))
 
 
-def _by_scene(cells: Mapping[tuple[str, Any], Mapping[str, Any]], methods: Sequence[str]) -> Table:
+def _table_by_scene(values: "DataFrame", lines: list[str]) -> Table:
     """The measure of each method on each scene at `TYPICAL_PHOTONS`, means over seeds."""
-    known = [method for method in methods if (method, TYPICAL_PHOTONS) in cells]
-    of = {method: cells[method, TYPICAL_PHOTONS]["of"] for method in known}
-    scenes = dict.fromkeys(scene for own in of.values() for scene in own)
+    cells = _typical(values).pivot(index="scene", columns="method", values="value")
+    cells = cells[[method for method in lines if method in cells]]
     rows = [
-        (scene, *(f"{own[scene]:.3f}" if scene in own else "–" for own in of.values())) for scene in scenes
+        (str(scene), *("–" if np.isnan(value) else f"{value:.3f}" for value in row))
+        for scene, row in zip(cells.index, cells.to_numpy().tolist(), strict=True)
     ]
-    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *known), tuple(rows))
+    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *cells.columns), tuple(rows))
 
 
-def _best_and_worst(
-    kind: Kind, cells: Mapping[tuple[str, Any], Mapping[str, Any]], method: str, folder: Path
-) -> dict[str, Any]:
+def _typical(values: "DataFrame") -> "DataFrame":
+    return values[values["light"] == TYPICAL_PHOTONS]
+
+
+def _best_and_worst(comparison: Comparison, values: "DataFrame", method: str, folder: Path) -> dict[str, Any]:
     """Scenes that a method does best and worst at `TYPICAL_PHOTONS`, each with its score and picture."""
-    of = cells[method, TYPICAL_PHOTONS]["of"]
-    order = sorted(of, key=lambda scene: -kind.sign * of[scene])
-    shown = order if len(order) <= 2 * SCENES_NAMED else [*order[:SCENES_NAMED], *order[-SCENES_NAMED:]]
+    own = _typical(values[values["method"] == method]).assign(
+        order=lambda table: -comparison.sign * table["value"]
+    )
+    pairs = own.sort_values("order", kind="stable")[["scene", "value"]].to_numpy().tolist()
     scenes = []
-    for scene in shown:
-        file = folder / picture_name(kind.part, scene)
+    for scene, value in (
+        pairs if len(pairs) <= 2 * SCENES_NAMED else pairs[:SCENES_NAMED] + pairs[-SCENES_NAMED:]
+    ):
+        file = folder / picture_name(comparison.measure, scene)
         picture = uri_of("webp", file.read_bytes()) if file.is_file() else None
-        scenes.append({"name": scene, "score": f"{of[scene]:.2f}", "picture": picture})
+        scenes.append({"name": scene, "score": f"{value:.2f}", "picture": picture})
     return {"method": method, "scenes": scenes}
 
 
-def _submissions(
-    made_by: Mapping[str, str],
-    said_of: Mapping[str, Mapping[str, Any]],
-    groups: Sequence[Mapping[str, Any]],
+def _submission_table(
+    submissions: Mapping[Path, Mapping[str, Any]], folder_of: Mapping[str, Path], frame: "DataFrame"
 ) -> Table:
-    """Whose each method is, what it took, and the command that measures it again."""
-    scores = Counter[str]()
-    for group in groups:
-        for row in group["results"]:
-            scores[row["method"]] += row["seeds"]
+    """Whose each method is, what it took, and the command that measures it again, in a folder of its own."""
     rows = []
-    for method, folder in sorted(made_by.items()):
-        said = said_of[folder]
-        run = said["made"].startswith("run")
-        verb, what = ("run", method) if run else ("score", "MAPS")
+    for method, folder in sorted(folder_of.items()):
+        about = submissions[folder]
+        is_run = about["made"].startswith("run")
+        work = f"run {about.get('command_name', method)}" if is_run else "score MAPS"
         rows.append(
             (
                 method,
-                str(said.get("authors", "–")),
-                str(said.get("url", "–")),
-                f"{said['peak_memory_mb']} MB" if run else "–",
-                str(scores[method]),
-                f"pcii benchmark {verb} {what} --data BENCHMARK --half {said['half']} -o OUT",
+                str(about.get("authors", "–")),
+                str(about.get("url", "–")),
+                f"{about['peak_memory_mb']} MB" if is_run else "–",
+                str(len(frame[frame["method"] == method].drop_duplicates(["identity", "light"]))),
+                f"pcii benchmark {work} --data BENCHMARK --half {about['half']} -o submissions/{folder.name}",
             )
         )
     header = ("method", "authors", "url", "memory at most", "scores", "command")

@@ -1,10 +1,11 @@
 """Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME.
 
-A function, which nobody has registered, is one of removal, or of depth where it is given as a pair
-("depth:NAME", function).
+A function that nobody has registered is named "module:function" or "file.py:function", with "depth:" before
+it for depth; in Python it is given itself, or as a pair of a name and the function.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from pcii.base.errors import InputError
@@ -13,11 +14,40 @@ from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, 
 from pcii.removal.methods import removal_methods
 
 DEPTH = "depth"
-"""Asks for the default estimator of depth, which has its full name in rows."""
+"""Names the default estimator of depth, which has its full name in rows."""
 _PREFIX = f"{DEPTH}:"
 Function = Callable[..., Any]
 Method = str | Function | tuple[str, Function]
 """What may be given as a method: a name, a removal, or a name and a function."""
+
+
+@dataclass(frozen=True)
+class NamedMethod:
+    """A method by its full name, and the function of one that nobody has registered.
+
+    `source` is the "module:function" or "file.py:function" that it was loaded from.
+    """
+
+    name: str
+    function: Function | None = None
+    source: str = ""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Another process loads the function from its source: modules of files cannot be sent.
+        if self.source:
+            return named_method, (self.source,)
+        return NamedMethod, (self.name, self.function)
+
+    @property
+    def command_name(self) -> str:
+        """What the method is called on a command line."""
+        return self.source or self.name
+
+    def takes(self, *, full_light: bool) -> bool:
+        """Whether it takes radiance (`full_light`) or photon counts; functions of depth take both."""
+        if self.function is not None:
+            return not full_light or estimator_of(self.name) is not None
+        return self.name in methods_for(full_light=full_light)
 
 
 def depth_name(estimator: str) -> str:
@@ -50,57 +80,47 @@ def methods_for(*, full_light: bool) -> tuple[str, ...]:
     return (*removal, *map(depth_name, estimators))
 
 
-def named_functions(methods: Sequence[Method]) -> dict[str, Function | None]:
-    """The methods by their names, with the function of those that are given as one.
+def known_methods() -> list[str]:
+    """Full names of all methods."""
+    return list(dict.fromkeys(name for kind in (False, True) for name in methods_for(full_light=kind)))
 
-    Raises `InputError` for an unknown name, and for a function by a name that is taken.
 
-    >>> named_functions(["likelihood", ("all", lambda counts, sections: sections.counts > 0)]).keys()
-    dict_keys(['likelihood', 'all'])
+def named_methods(methods: Sequence[Method]) -> list[NamedMethod]:
+    """The methods, each once; `InputError` for an unknown name, and for a function by a name that is taken.
+
+    >>> [method.name for method in named_methods(["depth", ("all", lambda counts, sections: None)])]
+    ['depth:posterior', 'all']
     """
-    found: dict[str, Function | None] = {}
-    for method in methods:
-        if isinstance(method, str) and ":" in (estimator_of(method) or method):
-            function = load_function(estimator_of(method) or method)
-            name = name_of(function)
-            method = (name if estimator_of(method) is None else depth_name(name)), function
-        if isinstance(method, str):
-            check_method(method)
-            found.setdefault(method)
-            continue
+    found: dict[str, NamedMethod] = {}
+    for each in methods:
+        method = named_method(each)
+        if found.setdefault(method.name, method) != method:
+            raise InputError(f"methods: {method.name!r} is there twice; give a pair (another name, function)")
+    return list(found.values())
+
+
+def named_method(method: Method) -> NamedMethod:
+    """A method by its full name; raises `InputError` as `named_methods` does."""
+    if not isinstance(method, str):
         name, function = method if isinstance(method, tuple) else (name_of(method), method)
         if not isinstance(name, str) or not callable(function):
             raise InputError(f"methods: expected names, functions, or pairs (name, function), got {method!r}")
-        if name in found or name in _all_names():
-            raise InputError(f"methods: the name {name!r} is taken; give a pair (another name, function)")
-        found[name] = function
-    return found
-
-
-def full_name(method: str, *, full_light: bool, functions: Collection[str] = ()) -> str | None:
-    """Full name of a method that takes radiance (`full_light`) or photon counts; None if it does not.
-
-    `functions` are the names of methods that are given as a function. Those of depth take both.
-
-    >>> full_name("depth", full_light=False), full_name("depth", full_light=True)
-    ('depth:posterior', 'depth:posterior')
-    >>> full_name("likelihood", full_light=True) is None
-    True
-    """
+        return _checked(NamedMethod(name, function))
     if method == DEPTH:
-        return depth_name(DEFAULT_METHOD)
-    if method in functions:
-        return None if full_light and estimator_of(method) is None else method
-    return method if method in methods_for(full_light=full_light) else None
+        return NamedMethod(depth_name(DEFAULT_METHOD))
+    if method in known_methods():
+        return NamedMethod(method)
+    estimator = estimator_of(method)
+    source = method if estimator is None else estimator
+    if ":" not in source:
+        known = ", ".join([DEPTH, *known_methods()])
+        raise InputError(f"method: there is no method named {method!r}; use {known}, or module:function")
+    function = load_function(source)
+    name = name_of(function)
+    return _checked(NamedMethod(name if estimator is None else depth_name(name), function, method))
 
 
-def check_method(method: str) -> None:
-    """Raise `InputError`, listing the known names, for a method that takes no data at all."""
-    known = _all_names()
-    if method not in known:
-        raise InputError(f"method: there is no method named {method!r}; use {', '.join(known)}")
-
-
-def _all_names() -> list[str]:
-    names = dict.fromkeys(name for kind in (False, True) for name in methods_for(full_light=kind))
-    return [DEPTH, *names]
+def _checked(method: NamedMethod) -> NamedMethod:
+    if method.name in (DEPTH, *known_methods()):
+        raise InputError(f"methods: the name {method.name!r} is taken; give the function another name")
+    return method

@@ -1,23 +1,23 @@
 """What made a figure: the source and the weights of what computes, versions, and the machine.
 
-`software_of` decides for the rows of an evaluation: what other software made is made again.
+`software_of` decides for the results of `pcii run` and for the rows of an evaluation alike: what other
+software made is made again.
 """
 
 import os
 import platform
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pcii.depth import methods as depth
-from pcii.evaluation.method_names import estimator_of
+from pcii.evaluation.method_names import NamedMethod, estimator_of
 from pcii.removal import methods as removal
 from pcii.store.folders import hash_bytes
-from pcii.store.software import own_software, software_of_entry_point
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+from pcii.store.software import PACKAGE, hash_of_source, own_software, software_of_entry_point
 
 
 def software_of(method: str) -> dict[str, str]:
@@ -26,11 +26,29 @@ def software_of(method: str) -> dict[str, str]:
     For a method of another package these are also that package's version, source and requirements. The source
     is every file of a package, so also the weights of a network.
     """
-    point = _entry_point(method)
+    estimator = estimator_of(method)
+    point = removal.REGISTRY.point_of(method) if estimator is None else depth.REGISTRY.point_of(estimator)
     return own_software() | ({} if point is None else software_of_entry_point(point))
 
 
-def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def software_of_method(method: NamedMethod) -> dict[str, str] | None:
+    """The same of a method that may be a function: of one with a source that file, of others nobody knows."""
+    if method.function is None:
+        return software_of(method.name)
+    if not method.source:
+        return None
+    place = (estimator_of(method.source) or method.source).rpartition(":")[0]
+    if place.endswith(".py"):
+        file = Path(place)
+    else:
+        spec = find_spec(place)
+        assert spec is not None
+        assert spec.origin is not None
+        file = Path(spec.origin)
+    return own_software() | {f"source of {place}": hash_of_source([file])}
+
+
+def origin_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What measured rows: how many each version of each package, and each machine, did; first and last day.
 
     `differing` names what has several versions or sources, `unknown` is the number of rows that do not tell,
@@ -43,30 +61,22 @@ def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     identities = sorted({row["identity"] for row in rows})
     days = sorted(row["date"] for row in rows if "date" in row)
     return {
+        "version": version(PACKAGE),
         "software": {name: dict(counter) for name, counter in software.items()},
         "differing": sorted(name for name, counter in software.items() if len(counter) > 1),
         "unknown": sum(not row.get("software") for row in rows),
         "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
-        "days": [days[0], days[-1]] if days else None,
+        "days": [days[0], days[-1]] if days else [],
         "datasets": hash_bytes("\0".join(identities).encode(errors="backslashreplace")),
     }
 
 
 def machine() -> str:
     """Processor and system, without a name by which the machine could be found."""
-    return f"{_processor()}, {os.cpu_count()} logical cores, {platform.system()}"
-
-
-def _entry_point(method: str) -> "EntryPoint | None":
-    """Where another package has the method; None for a built-in one."""
-    estimator = estimator_of(method)
-    return removal.REGISTRY.point_of(method) if estimator is None else depth.REGISTRY.point_of(estimator)
-
-
-def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         lines = []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0]} ({platform.machine()})" if models else platform.machine()
+    processor = f"{models[0]} ({platform.machine()})" if models else platform.machine()
+    return f"{processor}, {os.cpu_count()} logical cores, {platform.system()}"

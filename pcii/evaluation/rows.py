@@ -1,16 +1,22 @@
-"""rows.jsonl: one JSON object per measured score, written safely by several processes at once.
+"""Rows of an evaluation: rows.jsonl, which grows while methods are measured, and the frame that they make.
 
-A row belongs to a dataset (by its identity), a photon budget or full light, and a method. What is measured
-again, since other software made it, is added below, and the last row counts.
+rows.jsonl has one JSON object for each dataset, light and method. What is measured again, since other
+software made it, is added below, and the last row counts.
+
+The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
+docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
+other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
+blur, `entropy_gap_bits`, `bad_1px` and the other errors of depth, with dots for what is nested, `bound_px`.
 """
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from statistics import median
+from typing import IO, TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
@@ -18,32 +24,28 @@ from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from pcii.store.manifests import DatasetManifest
 
 Row = dict[str, Any]
 Key = tuple[str, Budget, str, tuple[float, ...]]
-Cells = Mapping[tuple[Budget, str], Mapping[str, Row]]
-"""Rows of one scene by budget and method, and then by the identity of their dataset."""
+EXPOSURE = "by exposure"
+"""Light of datasets whose recipe has an exposure time instead of a number of photons."""
+HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
+NO_MEASURES = frozenset(HEAD)
+"""Columns of the frame that say of what a row is."""
 
 
-@dataclass(frozen=True)
-class Measure:
-    """What methods of one kind are compared by: the value of a row, and the sign that makes more better."""
+def light_order(light: Budget) -> tuple[int, float]:
+    """Key that sorts lights: numbers of photons, then an exposure, then full light.
 
-    name: str
-    of: Callable[[Row], float | None]
-    sign: int
-
-
-def by_light(budget: Budget) -> tuple[int, float]:
-    """Key that sorts budgets by light: numbers of photons, then an exposure, then full light.
-
-    >>> sorted([FULL_LIGHT, None, 300.0, 30.0], key=by_light)
-    [30.0, 300.0, None, 'full-light']
+    >>> sorted(["full-light", "by exposure", 300.0, 30.0], key=light_order)
+    [30.0, 300.0, 'by exposure', 'full-light']
     """
-    if budget == FULL_LIGHT:
+    if light == FULL_LIGHT:
         return 2, 0.0
-    return (1, 0.0) if budget is None else (0, float(budget))
+    return (1, 0.0) if light is None or isinstance(light, str) else (0, float(light))
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -59,80 +61,198 @@ def recipe_of(manifest: "DatasetManifest") -> str:
     return hash_json({"recipe": recipe, "scene": manifest.get("scene")})[:16]
 
 
-def described(dataset: Dataset, z_mm: Sequence[float]) -> Row:
+def describe_dataset(dataset: Dataset, z_mm: Sequence[float]) -> Row:
     """The fields of a row that describe its dataset, seen at the depths `z_mm` or, of none, at its own."""
     manifest = dataset.manifest
     recipe = manifest.recipe
-    settings = dict(_settings({name: recipe[name] for name in recipe if name not in ("title", "seed")}))
     row = {
         "dataset": dataset.name,
         "identity": identity_of(manifest),
         "recipe": recipe_of(manifest),
         "title": manifest.title or dataset.name,
-        "scene": recipe.get("scene"),
         "seed": recipe.get("seed"),
-        "settings": settings,
+        "settings": dict(_leaves({name: recipe[name] for name in recipe if name not in ("title", "seed")})),
     }
-    if not z_mm:
-        return row
-    apart = {
-        "settings": settings | {"analysis.z_mm": [*z_mm]},
-        "recipe": hash_json([row["recipe"], *z_mm])[:16],
-    }
-    return row | apart | {"z_mm": [*z_mm]}
+    if z_mm:
+        row["z_mm"] = [*z_mm]
+        row["settings"]["analysis.z_mm"] = [*z_mm]
+        row["recipe"] = hash_json([row["recipe"], *z_mm])[:16]
+    return row
 
 
-def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Every value of nested tables by its dotted name, as `--set` takes it."""
     for name, value in table.items():
         if isinstance(value, Mapping):
-            yield from _settings(value, f"{prefix}{name}.")
+            yield from _leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
-    """Identity of the dataset, photon budget and method of a row, and depths where others were asked for."""
+    """Identity of the dataset, light and method of a row, and depths where others were asked for."""
     return row["identity"], row["budget"], row["method"], tuple(row.get("z_mm", ()))
 
 
-def claim_rows(out: Path) -> None:
-    """Make `out` the folder of an evaluation; `InputError` if it holds something else."""
-    EVALUATION_FOLDER.guard(out)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / ROWS).touch()
+@dataclass(frozen=True)
+class RowFile:
+    """The rows of an evaluation, by key, whose file no other process writes meanwhile."""
+
+    file: IO[bytes]
+    rows: dict[Key, Row]
+
+    def add(self, row: Row) -> None:
+        """Add a row and flush it to disk."""
+        # Names of files may hold bytes that are not valid characters.
+        text = json.dumps(row, ensure_ascii=False, allow_nan=False)
+        with named_in_errors(Path(self.file.name)):
+            self.file.write(text.encode(errors="backslashreplace") + b"\n")
+            self.file.flush()
+            os.fsync(self.file.fileno())
+        self.rows[key_of(row)] = row
 
 
 @contextmanager
-def all_rows(out: Path) -> Iterator[list[Row]]:
-    """The last row of each key in the folder; other processes wait until the block ends before they add any.
+def writing_rows(out: Path) -> Iterator[RowFile]:
+    """The rows in the folder of an evaluation, new or not, to add to; an unfinished last line is removed.
 
-    A last line without a line break is left by a process that was killed, and is ignored. Raises `InputError`
-    for any other line that is not a row as it was written.
+    Raises `InputError` if the folder holds something else, or another process adds rows to it.
     """
-    with locked(out / ROWS, wait=True) as file:
-        *lines, _ = file.read().split(b"\n")
-        rows: dict[Key, Row] = {}
-        for number, line in enumerate(lines, start=1):
-            try:
-                row = json.loads(line)
-                rows[key_of(row)] = row
-            except (ValueError, KeyError, TypeError) as fault:
-                raise InputError(f"{out / ROWS}: line {number}: {fault}; delete that line") from None
-        yield list(rows.values())
+    EVALUATION_FOLDER.guard(out)
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        with locked(out / ROWS, wait=False) as file:
+            content = file.read()
+            file.truncate(content.rfind(b"\n") + 1)
+            yield RowFile(file, _parsed(out, content))
+    except BlockingIOError:
+        raise InputError(f"{out}: another run writes here; wait for it, or name another folder") from None
 
 
-def append_row(out: Path, row: Row) -> None:
-    """Add a row and flush it to disk, after removing an incomplete last line of a killed process."""
-    # Names of files may hold bytes that are not valid characters.
-    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
-    line = text.encode(errors="backslashreplace") + b"\n"
-    with named_in_errors(out / ROWS), locked(out / ROWS, wait=True) as file:
-        if file.seek(0, os.SEEK_END):
-            file.seek(-1, os.SEEK_END)
-            if file.read(1) != b"\n":
-                file.seek(0)
-                file.truncate(file.read().rfind(b"\n") + 1)
-        file.write(line)
-        file.flush()
-        os.fsync(file.fileno())
+def read_rows(out: Path) -> list[Row]:
+    """The last row of each key in a folder; `InputError` if there are none, and for a line that is no row."""
+    try:
+        return list(_parsed(out, (out / ROWS).read_bytes()).values())
+    except FileNotFoundError:
+        raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one") from None
+
+
+def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
+    *lines, _ = content.split(b"\n")  # the last one is empty, or unfinished
+    rows: dict[Key, Row] = {}
+    for number, line in enumerate(lines, start=1):
+        try:
+            row = json.loads(line)
+            rows[key_of(row)] = row
+        except (ValueError, KeyError, TypeError):
+            raise InputError(f"{out / ROWS}: line {number} is damaged; delete that line") from None
+    return rows
+
+
+def read_frame(out: str | Path) -> "DataFrame":
+    """The frame of the evaluation in a folder; raises `InputError` as `read_rows` does."""
+    return frame_of(read_rows(Path(out)))
+
+
+def frame_of(rows: Sequence[Row]) -> "DataFrame":
+    """The frame of rows, whose columns the docstring of this module explains; scenes in their order."""
+    import pandas as pd
+
+    labels = _labels(rows)
+    records = [
+        {"scene": labels[row["title"], row["recipe"]], "light": _light(row["budget"])}
+        | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
+        | {"z_mm": None, "objects": None}
+        | {name: row.get(name) for name in ("photons_per_view", "seconds")}
+        | measured
+        for row in rows
+        for measured in (_of_depth(row) if "depth" in row else _of_planes(row))
+    ]
+    frame = pd.DataFrame(records, columns=None if records else [*HEAD])
+    texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
+    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
+    numbers = frame.columns.difference([*texts, "light"])
+    frame[numbers] = frame[numbers].astype("float64")
+    frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
+    lights = sorted(set(frame["light"]), key=light_order)
+    frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
+    return frame
+
+
+def _light(budget: Budget) -> float | str:
+    return EXPOSURE if budget is None else budget
+
+
+def _encodable(text: str) -> str:
+    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
+    return text.encode(errors="backslashreplace").decode()
+
+
+def _of_depth(row: Row) -> Iterable[Row]:
+    sigmas = [
+        entry["depth_sigma_px"]
+        for entry in row.get("bounds", {}).get("objects", ())
+        if entry["depth_sigma_px"] is not None
+    ]
+    bound = {"bound_px": median(sigmas)} if sigmas else {}
+    return [dict(_leaves(row["depth"])) | bound]
+
+
+def _of_planes(row: Row) -> Iterable[Row]:
+    """A record for each plane, with its scores against both kinds of truth."""
+    records: dict[float, Row] = {}
+    gaps = _entropy_gaps(row)
+    for plane in row["planes"]:
+        z_mm, is_of_objects = plane["z_mm"], plane["truth"] == "object"
+        record = records.setdefault(z_mm, {"z_mm": z_mm, "objects": None})
+        scores = {name: plane[name] for name in plane if name not in ("z_mm", "object", "truth")}
+        if is_of_objects:
+            own = [gaps[name] for name in (plane["object"] or "").split(", ") if name in gaps]
+            record |= {"objects": plane["object"], "entropy_gap_bits": min(own, default=None)}
+        record |= scores if is_of_objects else {f"pixel_{name}": scores[name] for name in scores}
+    return records.values()
+
+
+def _entropy_gaps(row: Row) -> dict[str, float]:
+    """By how many bits the entropy of each object is lower at its plane than at the best other one."""
+    plane_of = object_planes(row["planes"])
+    gaps: dict[str, float] = {}
+    for entry in row.get("objects", ()):
+        bits = {z: value for z, value in entry["entropy"].items() if value is not None}
+        own = bits.pop(plane_of.get(entry["name"], ""), None)
+        if own is not None and bits:
+            gaps[entry["name"]] = min(bits.values()) - own
+    return gaps
+
+
+def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Depth of the plane that each object belongs to, spelled as in the keys of `Score.objects`."""
+    return {name: f"{row['z_mm']:g}" for row in planes for name in (row["object"] or "").split(", ") if name}
+
+
+def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
+    """By title and recipe: the title, with the settings that distinguish it from others of the same title."""
+    settings: dict[str, dict[str, Mapping[str, Any]]] = {}
+    for row in rows:
+        settings.setdefault(row["title"], {}).setdefault(row["recipe"], row.get("settings", {}))
+    labels: dict[tuple[str, str], str] = {}
+    for title, by_recipe in settings.items():
+        texts = {
+            recipe: {
+                name: value if isinstance(value, str) else json.dumps(value) for name, value in own.items()
+            }
+            for recipe, own in by_recipe.items()
+        }
+        names = dict.fromkeys(name for own in texts.values() for name in own)
+        differing = [name for name in names if len({own.get(name) for own in texts.values()}) > 1]
+        words = {
+            recipe: [f"{name}={own[name]}" for name in differing if name in own]
+            for recipe, own in texts.items()
+        }
+        for recipe, own in words.items():
+            if (
+                len(words) > 1 and list(words.values()).count(own) > 1
+            ):  # a scene was changed, or has no recipe
+                own = [*own, f"recipe {recipe[:8]}"]
+            labels[title, recipe] = f"{title} ({', '.join(own)})" if own else title
+    return labels

@@ -1,259 +1,193 @@
-"""Summary of the rows of an evaluation: means over seeds, and paired comparisons of methods."""
+"""Means of an evaluation with their intervals, and comparisons of methods on the same datasets.
 
-import json
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import version
-from itertools import combinations, pairwise
-from typing import Any
+All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed alone are one scene.
+"""
 
-from pcii.evaluation.paired_tests import mean_interval, paired_difference, positive_mean_interval
-from pcii.evaluation.pooling import pooled
-from pcii.evaluation.provenance import record
-from pcii.evaluation.rows import Budget, Cells, Measure, Row, by_light
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-INTERVALS = (
-    "95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the logarithm "
-    "of the mean for seconds and other values that are never negative; null for one seed"
-)
-TABLE_1_METHOD = "three-step"
-TRUTHS = ("object", "pixel")
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.evaluation.rows import NO_MEASURES
+
+if TYPE_CHECKING:
+    from pandas import DataFrame, Series
+
+Kind = Literal["signed", "share", "positive", "geometric"]
+CONFIDENCE = 0.95
+MAX_EXACT_PAIRS = 14
+"""Up to so many pairs all assignments of signs are computed: 2^14 means take milliseconds."""
+RANDOM_FLIPS = 10_000
+"""Random assignments of signs for more pairs."""
+MIN_SCENES = 2
+"""One scene has no spread over scenes."""
+CELL = ("scene", "light", "method")
 SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage", "answered"}
 SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 SHARES |= {"ece", "share", "confidence", "correct"}
-SIGNED = {"bias_mm", "bias_px"}
+SIGNED = {"bias_mm", "bias_px", "entropy_gap_bits"}
+SIGNS = {"iou": 1, "bad_1px": -1}
+"""What methods of removal and of depth are compared by, and the sign that makes more better."""
 
 
-def summarise(rows: Sequence[Row]) -> dict[str, Any]:
-    """The content of evaluation.json: `groups`, one for each recipe, of datasets that differ in seed.
+class Mean(NamedTuple):
+    """Mean of `n` values and the ends of its 95 % interval, NaN for one value."""
 
-    A group's `label` is its title, with the settings that differ between groups of the same title. Its
-    `results` have a row for each budget and method: means over seeds with their intervals, by kind of truth,
-    as the mean over the planes and plane by plane; of depth maps the errors of `Score.depth` in `depth`, and
-    in `bounds`, where there is radiance, `depth_sigma_px` of each object. `paired` compares methods on the
-    same datasets, by their `measure`: those of removal by "iou", the mean object IoU, where more is better,
-    those of depth by "bad_1px", where less is. `monotonic` lists where it is significantly worse at one
-    budget than at the next smaller one: its `difference` is negative for "iou" and positive for "bad_1px".
-    `table1` has in how many seeds each object's entropy is lowest at the plane that the object belongs to.
+    n: int
+    mean: float
+    low: float
+    high: float
 
-    `pooled` ranks methods over all groups (see `pcii.evaluation.pooling`), and `made` has by what the rows
-    were measured, on which machines and days (see `pcii.evaluation.provenance`).
+
+def mean_interval(values: Sequence[float], kind: Kind = "signed") -> Mean:
+    """Mean of values and its 95 % interval by Student's t.
+
+    Assumes independent, approximately normal values, as means of shares far from 0 and 1 are. That of a
+    "share" is clipped to [0, 1]. Of "positive" values, such as times and errors, it is Student's interval of
+    the logarithm of the mean, whose standard error is about s / (mean sqrt(n)): from mean / r to mean r,
+    r = exp(t s / (mean sqrt(n))). So it never reaches 0, approaches the other one for values close together,
+    and is longer above than below if a few large values dominate. "geometric" is the geometric mean of values
+    above 0, with Student's interval of the mean of logarithms. Raises `InputError` for no values, and for
+    numbers that are not finite or below 0 where they cannot be.
+
+    >>> mean = mean_interval([0.8, 0.9, 1.0], "share")
+    >>> round(mean.low, 3), round(mean.mean, 3), round(mean.high, 3)
+    (0.652, 0.9, 1.0)
     """
-    groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
-    for row in rows:
-        groups[row["title"], row["recipe"]].append(row)
-    kinds = [_by_kind(_cells(members)) for members in groups.values()]
-    return {
-        "version": version("photon-integral-imaging"),
-        "interval": INTERVALS,
-        "groups": [
-            {"label": _label(rows[0], [members[0] for members in groups.values()]), **_group(recipe, rows)}
-            for (_, recipe), rows in sorted(groups.items())
-        ],
-        "pooled": [
-            *pooled([removal for removal, _ in kinds], _IOU),
-            *pooled([depth for _, depth in kinds], _BAD_1PX),
-        ],
-        "made": record(rows),
-    }
+    x = np.asarray(values, dtype=np.float64)
+    if x.ndim != 1 or x.size == 0 or not np.isfinite(x).all():
+        raise InputError("values: expected a list of at least one finite number")
+    if kind == "positive" and x.min() < 0:
+        raise InputError("values: expected numbers of at least 0")
+    mean, low, high = (float(end) for end in _intervals(x, kind))
+    return Mean(x.size, mean, low, high)
 
 
-def _label(row: Row, groups: Sequence[Row]) -> str:
-    """Title of a row's group, with the settings that distinguish it from other groups of the same title."""
-    same_title = [each for each in groups if each["title"] == row["title"]]
-    rivals = [each.get("settings", {}) for each in same_title if each["recipe"] != row["recipe"]]
-    distinctions: list[str] = []
-    for name, value in row.get("settings", {}).items():
-        left = [settings for settings in rivals if name in settings and settings[name] == value]
-        if len(left) < len(rivals):
-            distinctions.append(f"{name}={value if isinstance(value, str) else json.dumps(value)}")
-        rivals = left
-    if rivals:  # a scene was changed under the same name, or there is no recipe
-        distinctions.append(f"recipe {row['recipe'][:8]}")
-    return f"{row['title']} ({', '.join(distinctions)})" if distinctions else row["title"]
+def _intervals(x: np.ndarray, kind: Kind) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means over the last axis and the ends of their intervals."""
+    from scipy import stats  # half a second
+
+    if kind == "geometric":
+        mean, low, high = _intervals(np.log(x), "signed")
+        return np.exp(mean), np.exp(low), np.exp(high)
+    n, mean = x.shape[-1], x.mean(axis=-1)
+    if n == 1:
+        return mean, np.full_like(mean, np.nan), np.full_like(mean, np.nan)
+    half = stats.t.ppf((1 + CONFIDENCE) / 2, n - 1) * x.std(axis=-1, ddof=1) / np.sqrt(n)
+    if kind == "positive":
+        ratio = np.exp(np.divide(half, mean, out=np.zeros_like(mean), where=half > 0))
+        return mean, mean / ratio, mean * ratio
+    low, high = mean - half, mean + half
+    return (mean, np.maximum(low, 0.0), np.minimum(high, 1.0)) if kind == "share" else (mean, low, high)
 
 
-def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Depth of the plane that each object belongs to, spelled as in the keys of `Score.objects`."""
-    plane_of: dict[str, str] = {}
-    for row in planes:
-        for name in (row["object"] or "").split(", "):
-            plane_of[name] = f"{row['z_mm']:g}"
-    return plane_of
+def sign_flip_p(differences: np.ndarray) -> tuple[np.ndarray, float]:
+    """Two-sided p of a sign-flip test for each row of `differences`, and the smallest p that is possible.
+
+    If neither of two methods is better, both signs of each difference are equally likely: p is the share of
+    assignments of signs whose mean is at least as far from 0 as the observed one. It is of all 2^n up to
+    n = `MAX_EXACT_PAIRS`, else of `RANDOM_FLIPS` random ones and the observed one.
+    """
+    from scipy import stats
+
+    n = differences.shape[-1]
+    if n == 1:
+        return np.ones(differences.shape[:-1]), 1.0
+    is_exact = n <= MAX_EXACT_PAIRS
+    test = stats.permutation_test(
+        (differences,),
+        np.mean,
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=2**n if is_exact else RANDOM_FLIPS,
+        batch=1000,
+        axis=-1,
+        rng=0,
+    )
+    return np.asarray(test.pvalue), 2 / 2**n if is_exact else 2 / (1 + RANDOM_FLIPS)
 
 
-_IOU = Measure("iou", lambda row: over_planes(row, "object").get("iou"), 1)
-_BAD_1PX = Measure("bad_1px", lambda row: row["depth"].get("bad_1px"), -1)
+def measures_of(frame: "DataFrame") -> list[str]:
+    """Columns of a frame that hold what was measured."""
+    return [column for column in frame.columns if column not in NO_MEASURES]
 
 
-def _cells(rows: Sequence[Row]) -> Cells:
-    """Rows of a group in the order of their light and method, and in each cell by seed."""
-    cells: dict[tuple[Budget, str], dict[str, Row]] = defaultdict(dict)
-    for row in sorted(rows, key=lambda row: (row["seed"] or 0, row["identity"])):
-        cells[row["budget"], row["method"]][row["identity"]] = row
-    return {cell: cells[cell] for cell in sorted(cells, key=lambda cell: (by_light(cell[0]), cell[1]))}
+def kind_of(measure: str) -> Kind:
+    """What interval the mean of a measure has."""
+    name = measure.removeprefix("pixel_").rpartition(".")[2]
+    return "share" if name in SHARES else "signed" if name in SIGNED else "positive"
 
 
-def _by_kind(cells: Cells) -> tuple[Cells, Cells]:
-    """Cells of methods of removal, and of depth; all rows of a cell are of the same method."""
-    depth = {cell: rows for cell, rows in cells.items() if "depth" in next(iter(rows.values()))}
-    return {cell: rows for cell, rows in cells.items() if cell not in depth}, depth
+def lines_of(table: "DataFrame") -> list[Any]:
+    """The rows of a table, each with its columns as attributes."""
+    return list(table.itertuples())
 
 
-def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
-    cells = _cells(rows)
-    removal, depth = _by_kind(cells)
-    names = {row["identity"]: row["dataset"] for row in rows}
-    return {
-        "recipe": recipe,
-        "title": rows[0]["title"],
-        "scene": rows[0]["scene"],
-        "datasets": len(names),
-        "results": [_result(*cell, list(own.values())) for cell, own in cells.items()],
-        "paired": [*_paired(removal, _IOU), *_paired(depth, _BAD_1PX)],
-        "monotonic": [*_losses(removal, _IOU), *_losses(depth, _BAD_1PX)],
-        "table1": [
-            entry
-            for (budget, method), by_dataset in removal.items()
-            if method == TABLE_1_METHOD
-            for entry in _table1(budget, list(by_dataset.values()))
-        ],
-    }
+def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
+    """Mean of every measure over datasets, each the mean over its planes that have it.
+
+    Columns: those of `by`, then `measure`, `n`, `mean`, and the interval from `low` to `high`.
+    """
+    import pandas as pd
+
+    values = _by_dataset(frame, by)
+    parts = [_group_means(values[measure], by, kind_of(measure), measure) for measure in values.columns]
+    return pd.concat(parts, ignore_index=True)
 
 
-def _result(budget: Budget, method: str, rows: Sequence[Row]) -> dict[str, Any]:
-    photons = [row["photons_per_view"] for row in rows if row["photons_per_view"] is not None]
-    seconds = [row["seconds"] for row in rows if row["seconds"] is not None]  # of maps nobody knows
-    result: dict[str, Any] = {
-        "budget": budget,
-        "method": method,
-        "seeds": len(rows),
-        "photons_per_view": sum(photons) / len(photons) if photons else None,
-        "seconds": positive_mean_interval(seconds).figures() if seconds else None,
-    }
-    if "depth" in rows[0]:
-        return result | {"depth": _means([row["depth"] for row in rows])} | _bounds(rows)
-    depths = sorted({plane["z_mm"] for row in rows for plane in row["planes"]})
-    for kind in TRUTHS:
-        result[kind] = _means([over_planes(row, kind) for row in rows])
-    result["planes"] = [
-        {"z_mm": z} | {kind: _means([_plane(row, kind, z) for row in rows]) for kind in TRUTHS}
-        for z in depths
-    ]
-    return result
+def _by_dataset(frame: "DataFrame", by: Sequence[str]) -> "DataFrame":
+    """Means over the planes of each dataset; rows in the order of `by` and of seeds."""
+    keys = [*by, "seed", "identity"]
+    groups = frame[[*keys, *measures_of(frame)]].groupby(keys, observed=True, dropna=False)
+    return groups.mean().dropna(axis="columns", how="all")
 
 
-def _bounds(rows: Sequence[Row]) -> dict[str, Any]:
-    """`bounds`: means over seeds of each object's bound on depth and what it follows from."""
-    by_object: dict[str, list[dict[str, float | None]]] = defaultdict(list)
-    for row in rows:
-        for entry in row.get("bounds", {}).get("objects", ()):
-            by_object[entry["name"]].append({name: entry[name] for name in entry if name != "name"})
-    found = [{"name": name, **_means(entries)} for name, entries in by_object.items()]
-    return {"bounds": {"objects": found}} if found else {}
+def _group_means(values: "Series", by: Sequence[str], kind: Kind, measure: str) -> "DataFrame":
+    """Means of sorted values by group: groups of one size are the rows of one array."""
+    values = values.dropna()
+    sizes = values.groupby(level=list(by), observed=True, dropna=False).size()
+    table = sizes.reset_index(name="n")
+    ends = np.full((len(table), 3), np.nan)
+    for n in np.unique(table["n"]):
+        is_of_size = (table["n"] == n).to_numpy()
+        rows = values.to_numpy()[np.repeat(is_of_size, table["n"])].reshape(-1, n)
+        ends[is_of_size] = np.stack(_intervals(rows, kind), axis=-1)
+    table.insert(len(by), "measure", measure)
+    return table.assign(mean=ends[:, 0], low=ends[:, 1], high=ends[:, 2])
 
 
-def over_planes(row: Row, kind: str) -> dict[str, float | None]:
-    """Means over a row's planes of each score against one kind of truth, of the planes that have it."""
-    planes = [_plane_scores(plane) for plane in row["planes"] if plane["truth"] == kind]
-    means: dict[str, float | None] = {}
-    for name in dict.fromkeys(name for plane in planes for name in plane):
-        known = [value for plane in planes if (value := plane.get(name)) is not None]
-        means[name] = sum(known) / len(known) if known else None
-    return means
+def ranks(frame: "DataFrame", measure: str, over: str = "scene") -> "DataFrame":
+    """Methods at each light by their mean over scenes, the best first, on the datasets that all have.
 
+    Each scene counts once, as the mean over its seeds: further seeds say more about the same scene, and only
+    other scenes say how far a result holds. With `over` = "identity" each dataset counts, as for one scene.
+    Columns: `light`, `method`, `rank` (equal methods share one), `n` scenes (or datasets), `mean` with its
+    interval from `low` to `high`; of the difference to the best method on the same scenes `difference`,
+    `difference_low`, `difference_high`, `p` (see `sign_flip_p`) and `least_p`.
+    """
+    import pandas as pd
 
-def _plane(row: Row, kind: str, z_mm: float) -> dict[str, float | None]:
-    for plane in row["planes"]:
-        if plane["truth"] == kind and plane["z_mm"] == z_mm:
-            return _plane_scores(plane)
-    return {}
-
-
-def _plane_scores(plane: Mapping[str, Any]) -> dict[str, float | None]:
-    return {name: value for name, value in plane.items() if name not in ("z_mm", "object", "truth")}
-
-
-def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Mean and interval of each score, also nested, over the rows that have it; None if none has."""
-    means: dict[str, Any] = {}
-    for name in dict.fromkeys(name for row in rows for name in row):
-        known = [value for row in rows if (value := row.get(name)) is not None]
-        if not known:
-            means[name] = None
+    tables = [pd.DataFrame(columns=["light", "method"])]
+    known = frame[frame[measure].notna()] if measure in frame else frame[:0]
+    for light, at_light in known.groupby("light", observed=True):
+        keys = list(dict.fromkeys([over, "seed", "identity"]))
+        values = at_light.pivot_table(measure, keys, "method", observed=True, dropna=False, sort=True)
+        values = values.dropna().groupby(level=over, observed=True).mean()
+        if not len(values) or (over == "scene" and len(values) < MIN_SCENES):
             continue
-        if isinstance(known[0], Mapping):
-            means[name] = _means(known)
-            continue
-        if name in SIGNED:
-            mean = mean_interval(known)
-        elif name in SHARES:
-            mean = mean_interval(known, (0.0, 1.0))
-        else:
-            mean = positive_mean_interval(known)
-        means[name] = mean.figures()
-    return means
-
-
-def _compared(first: Mapping[str, Row], second: Mapping[str, Row], measure: Measure) -> dict[str, Any] | None:
-    """The measure of the first rows minus that of the second, on the datasets of both."""
-    pairs: list[tuple[float, float]] = []
-    for identity in first:
-        if identity in second:
-            a, b = (measure.of(rows[identity]) for rows in (first, second))
-            if a is not None and b is not None:
-                pairs.append((a, b))
-    if not pairs:
-        return None
-    test = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
-    return {"measure": measure.name, **test.figures()}
-
-
-def _paired(cells: Cells, measure: Measure) -> list[dict[str, Any]]:
-    entries: list[dict[str, Any]] = []
-    for (budget, method), (other_budget, other_method) in combinations(cells, 2):
-        if budget != other_budget:
-            continue
-        comparison = _compared(cells[budget, method], cells[other_budget, other_method], measure)
-        if comparison is not None:
-            entries.append({"budget": budget, "methods": [method, other_method], **comparison})
-    return entries
-
-
-def _losses(cells: Cells, measure: Measure) -> list[dict[str, Any]]:
-    """Where the whole interval of the change from one budget to the next larger one is for the worse."""
-    entries: list[dict[str, Any]] = []
-    for method in sorted({method for _, method in cells}):
-        for fewer, more in pairwise(cell for cell in cells if cell[1] == method):
-            comparison = _compared(cells[more], cells[fewer], measure)
-            interval = None if comparison is None else comparison["difference"]["interval"]
-            if interval is not None and max(measure.sign * end for end in interval) < 0:
-                assert comparison is not None
-                entries.append({"method": method, "from": fewer[0], "to": more[0], **comparison})
-    return entries
-
-
-def _table1(budget: Budget, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """In how many seeds each object's entropy is lowest at the object's plane, and by how many bits."""
-    gaps: dict[tuple[str, str], list[float]] = defaultdict(list)
-    for row in rows:
-        plane_of = object_planes(row["planes"])
-        for entry in row["objects"]:
-            name = entry["name"]
-            bits = {z: value for z, value in entry["entropy"].items() if value is not None}
-            at_plane = bits.pop(plane_of.get(name, ""), None)
-            if at_plane is not None and bits:
-                gaps[name, plane_of[name]].append(min(bits.values()) - at_plane)
-    return [
-        {
-            "budget": budget,
-            "object": name,
-            "own_z_mm": float(z),
-            "seeds": len(bits),
-            "lowest_at_own": sum(gap > 0 for gap in bits),
-            "smallest_gap_bits": min(bits),
-            "mean_gap_bits": sum(bits) / len(bits),
-        }
-        for (name, z), bits in gaps.items()
-    ]
+        x = values.to_numpy().T.copy()
+        score = SIGNS[measure] * x.mean(axis=-1)
+        order = np.argsort(-score, kind="stable")
+        x = x[order]
+        table = pd.DataFrame({"light": light, "method": values.columns[order]})
+        table["rank"] = [1 + int((score > own).sum()) for own in score[order]]
+        table["n"] = x.shape[1]
+        table[["mean", "low", "high"]] = np.stack(_intervals(x, kind_of(measure)), axis=-1)
+        ends = ["difference", "difference_low", "difference_high"]
+        table[ends] = np.stack(_intervals(x - x[0], "signed"), axis=-1)
+        table["p"], table["least_p"] = sign_flip_p(x - x[0])
+        table.loc[0, [*ends, "p", "least_p"]] = np.nan
+        tables.append(table)
+    return pd.concat(tables[1:] or tables, ignore_index=True)

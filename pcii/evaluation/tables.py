@@ -2,44 +2,50 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pcii.base.plain_text import in_markdown
-from pcii.evaluation.rows import by_light
+from pcii.evaluation.rows import EXPOSURE
+from pcii.evaluation.summary import CELL, SIGNS, lines_of, means, ranks
 from pcii.store.dataset import FULL_LIGHT, Budget
 
-Entry = Mapping[str, Any]
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 Column = tuple[str, Callable[[Any], str]]
 """The name of a column, and what an entry says in it."""
-
-IOU = ("IoU", "object", "iou")
-MEANS = (
-    IOU,
-    ("IoU, pixels", "pixel", "iou"),
-    ("oracle IoU, pixels", "pixel", "iou_oracle"),
-    ("boundary F", "object", "boundary_f"),
-    ("claimed share", "object", "claimed_share"),
-    ("photon precision", "object", "photon_precision"),
-    ("photon recall", "object", "photon_recall"),
-)
-"""What is shown of a result of removal: names of columns, and where their means are."""
-BAD_1PX = ("bad_1px", "depth", "bad_1px")
-OF_OBJECTS = ("BadPix(0.07)", "depth", "hci_objects", "badpix_007")
-OF_ALL_PIXELS = ("BadPix(0.07), all pixels", "depth", "hci", "badpix_007")
-"""It stands for that of objects where surfaces have no names, as in other people's data."""
-DEPTH_MEANS = (
-    ("median, px", "depth", "median_px"),
-    ("bias, px", "depth", "bias_px"),
-    BAD_1PX,
-    ("bad_3px", "depth", "bad_3px"),
-    OF_OBJECTS,
-    OF_ALL_PIXELS,
-    ("answered", "depth", "coverage"),
-    ("ECE", "depth", "ece"),
-)
-"""The same of a result of depth."""
-EXPOSURE = "by exposure"
-"""Name of the photon budget of datasets whose recipe has an exposure instead."""
+METHOD: Column = ("method", lambda entry: entry["method"])
+NAMES = {"iou": "IoU", "bad_1px": "bad_1px"}
+TITLES = {"iou": "IoU", "bad_1px": "Errors of depth above 1 px"}
+"""What methods of removal and of depth are compared by."""
+REMOVAL = {
+    "iou": "IoU",
+    "pixel_iou": "IoU, pixels",
+    "pixel_iou_oracle": "oracle IoU, pixels",
+    "boundary_f": "boundary F",
+    "claimed_share": "claimed share",
+    "photon_precision": "photon precision",
+    "photon_recall": "photon recall",
+    "entropy_gap_bits": "entropy gap, bits",
+    "seconds": "seconds",
+}
+"""Measures of removal in tables, and the names of their columns."""
+OF_OBJECTS, OF_ALL_PIXELS = "hci_objects.badpix_007", "hci.badpix_007"
+DEPTH = {
+    "median_px": "median, px",
+    "bound_px": "bound, px",
+    "bias_px": "bias, px",
+    "bad_1px": "bad_1px",
+    "bad_3px": "bad_3px",
+    OF_OBJECTS: "BadPix(0.07)",
+    OF_ALL_PIXELS: "BadPix(0.07), all pixels",
+    "coverage": "answered",
+    "ece": "ECE",
+    "seconds": "seconds",
+}
+"""The same of depth. BadPix of all pixels stands for that of objects where surfaces have no names."""
 
 
 @dataclass(frozen=True)
@@ -79,188 +85,115 @@ def markdown(table: Table) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 
-def with_interval(mean: Entry | None, digits: int = 3) -> str:
-    """A mean with its interval as text, a dash for None.
+def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
+    """A mean with its interval as text, a dash for NaN.
 
-    >>> with_interval({"mean": 0.912, "interval": [0.905, 0.919]})
-    '0.912 (0.905 to 0.919)'
+    >>> with_interval(0.912, 0.905, 0.919), with_interval(0.912, float("nan"), float("nan"))
+    ('0.912 (0.905 to 0.919)', '0.912')
     """
-    if mean is None:
+    if np.isnan(mean):
         return "–"
-    text = f"{mean['mean']:.{digits}f}"
-    if mean["interval"] is None:
-        return text
-    low, high = mean["interval"]
-    return f"{text} ({low:.{digits}f} to {high:.{digits}f})"
+    text = f"{mean:.{digits}f}"
+    return text if np.isnan(low) else f"{text} ({low:.{digits}f} to {high:.{digits}f})"
 
 
-def budget_name(budget: Budget) -> str:
-    """A photon budget as text; `EXPOSURE` where the recipe has an exposure time instead."""
-    if budget == FULL_LIGHT:
-        return "full light"
-    return EXPOSURE if budget is None else f"{budget:g}"
+def light_name(light: Budget) -> str:
+    """Photons of a light, or full light, as the name of a column or plot.
 
-
-def light_name(budget: Budget) -> str:
-    """Photons of a budget, or full light, in words.
-
-    >>> light_name(300.0), light_name("full-light"), light_name(None)
-    ('300 photons', 'full light', 'photons by exposure')
+    >>> light_name(300.0), light_name("full-light"), light_name("by exposure")
+    ('300', 'full light', 'by exposure')
     """
-    if budget is None:
-        return f"photons {EXPOSURE}"
-    return budget_name(budget) if budget == FULL_LIGHT else f"{budget_name(budget)} photons"
+    if light == FULL_LIGHT:
+        return "full light"
+    return EXPOSURE if light is None else f"{light:g}" if not isinstance(light, str) else light
 
 
-METHOD: Column = ("method", lambda entry: entry["method"])
-PHOTONS: Column = ("photons", lambda entry: budget_name(entry["budget"]))
-P_VALUES: tuple[Column, ...] = (
-    ("p", lambda entry: f"{entry['p']:.2g}{'' if entry['exact'] else ' (sampled)'}"),
-    ("least p possible", lambda entry: f"{entry['least_p']:.2g}"),
-)
-
-
-def tables_of(group: Entry) -> list[Table]:
-    """The tables of one group, without empty ones."""
-    tables = [_removal(group), _depth(group), _bounds(group)]
-    tables += [_paired(group, "iou", "IoU"), _paired(group, "bad_1px", "bad_1px"), _table1(group)]
+def tables_of_all(of_cells: "DataFrame", ranked: Mapping[str, "DataFrame"]) -> list[Table]:
+    """Ranks over all scenes, then means by scene and light: of methods of removal, then of depth."""
+    tables = [rank_table(ranked[name], name, f"{title} over all scenes") for name, title in TITLES.items()]
+    tables += [light_table(of_cells, name, f"{title} by photon budget") for name, title in TITLES.items()]
     return [table for table in tables if table.rows]
 
 
-def overviews(groups: Sequence[Entry]) -> list[Table]:
-    """`overview` and `depth_overview`, without empty ones."""
-    return [table for table in (overview(groups), depth_overview(groups)) if table.rows]
+def tables_of_scene(frame: "DataFrame", of_cells: "DataFrame") -> list[Table]:
+    """What was measured of one scene in full: removal, depth and comparisons; without empty ones."""
+    tables = [_results(frame, of_cells, "iou", REMOVAL), _results(frame, of_cells, "bad_1px", DEPTH)]
+    for name, title in TITLES.items():
+        title = f"{title}, methods compared on the same datasets"
+        tables.append(rank_table(ranks(frame, name, "identity"), name, title, "datasets"))
+    return [table for table in tables if table.rows]
 
 
-def overview(groups: Sequence[Entry]) -> Table:
-    """Mean object IoU of every group and method by photon budget; labels of groups differ."""
-    return _by_budget(groups, "IoU by photon budget", IOU[1:], 1)
+def light_table(of_cells: "DataFrame", measure: str, title: str) -> Table:
+    """A measure of every scene and method by light; `of_cells` is of `summary.means`."""
+    table = _with_texts(of_cells[of_cells["measure"] == measure], ["scene", "light"], measure)
+    return _pivoted(title, table, ["scene", "method"], "light", light_name)
 
 
-def depth_overview(groups: Sequence[Entry]) -> Table:
-    """Share of errors of depth above 1 px of every group and method by photon budget."""
-    return _by_budget(groups, "Errors of depth above 1 px by photon budget", BAD_1PX[1:], -1)
+def _with_texts(table: "DataFrame", contest: Sequence[str], measure: str, digits: int = 3) -> "DataFrame":
+    """The table with its means as `text`, and which is the best of its contest, where another is worse."""
+    ends = zip(table["mean"], table["low"], table["high"], strict=True)
+    values = SIGNS.get(measure, 0) * table["mean"]
+    groups = values.groupby([table[name] for name in contest], observed=True)
+    is_best = (values == groups.transform("max")) & (values > groups.transform("min"))
+    return table.assign(text=[with_interval(*mean, digits) for mean in ends], is_best=is_best)
 
 
-def _mean(entry: Entry, *path: str) -> Entry | None:
-    """A mean by the names of the mappings that it is in; None if it is not there."""
-    found: Any = entry
-    for name in path:
-        found = None if found is None else found.get(name)
-    return found
-
-
-def _mean_column(name: str, path: Sequence[str]) -> Column:
-    digits = 2 if name.endswith(", px") else 3
-    return name, lambda entry: with_interval(_mean(entry, *path), digits)
-
-
-def _mean_columns(means: Sequence[tuple[str, ...]], results: Sequence[Entry]) -> list[Column]:
-    """Columns of the means that a result has."""
-    return [_mean_column(name, path) for name, *path in means if any(_mean(row, *path) for row in results)]
-
-
-def _best(figures: Sequence[tuple[object, Entry | None]], sign: int) -> set[int]:
-    """Numbers of the figures with the best mean of their contest, where another one is worse."""
-    entered: dict[object, list[tuple[float, int]]] = {}
-    for number, (contest, figure) in enumerate(figures):
-        if figure is not None:
-            entered.setdefault(contest, []).append((sign * figure["mean"], number))
-    decided = [own for own in entered.values() if min(own)[0] < max(own)[0]]
-    return {number for own in decided for value, number in own if value == max(own)[0]}
-
-
-def _by_budget(groups: Sequence[Entry], title: str, path: Sequence[str], sign: int) -> Table:
-    cells: dict[tuple[str, str], dict[Budget, Entry | None]] = {}
-    for group in groups:
-        for row in group["results"]:
-            if path[0] in row:
-                cells.setdefault((group["label"], row["method"]), {})[row["budget"]] = _mean(row, *path)
-    budgets: set[Budget] = {budget for by_budget in cells.values() for budget in by_budget}
-    columns: list[Column] = [("scene", lambda entry: entry[0][0]), ("method", lambda entry: entry[0][1])]
-    best: dict[str, set[int]] = {}
-    for budget in sorted(budgets, key=by_light):
-        name = budget_name(budget)
-        columns.append((name, lambda entry, budget=budget: with_interval(entry[1].get(budget))))
-        best[name] = _best([(scene, means.get(budget)) for (scene, _), means in cells.items()], sign)
-    return tabulated(title, columns, list(cells.items()), words=2, best=best)
-
-
-def _results(
-    title: str, results: Sequence[Entry], columns: Sequence[Column], decisive: Sequence[str], sign: int
+def _pivoted(
+    title: str, table: "DataFrame", rows: Sequence[str], column: str, name: Callable[[Any], str] = str
 ) -> Table:
-    """Results by method and budget; the best of a budget by the `decisive` mean stand out."""
-    name, *path = decisive
-    lead: list[Column] = [METHOD, PHOTONS, ("seeds", lambda row: str(row["seeds"]))]
-    seconds: Column = ("seconds", lambda row: with_interval(row["seconds"], 2))
-    rows = _best([(row["budget"], _mean(row, *path)) for row in results], sign)
-    best = {"method": rows, name: rows} if rows else {}
-    return tabulated(title, [*lead, *columns, seconds], results, best=best)
+    """A table of texts with the columns `rows` and one for each value of `column`."""
+    cells = table.pivot(index=list(rows), columns=column, values=["text", "is_best"])
+    if not len(cells):
+        return Table(title, (), ())
+    texts = cells["text"].sort_index(axis="columns").fillna("–")
+    marked = np.argwhere(cells["is_best"].sort_index(axis="columns").eq(True).to_numpy())
+    index = texts.index.to_frame()
+    if "light" in index:
+        index["light"] = [light_name(light) for light in index["light"]]
+    lines = map(tuple, np.hstack([index.to_numpy(object), texts.to_numpy(object)]).tolist())
+    best = frozenset((int(row), len(rows) + int(number)) for row, number in marked)
+    return Table(title, (*rows, *map(name, texts.columns)), tuple(lines), len(rows), best)
 
 
-def _removal(group: Entry) -> Table:
-    results = [row for row in group["results"] if "object" in row]
-    depths = sorted({plane["z_mm"] for row in results for plane in row["planes"]})
+def _results(frame: "DataFrame", of_cells: "DataFrame", decisive: str, names: Mapping[str, str]) -> Table:
+    """Results of one scene by method and light; the best of a light by the decisive measure stand out."""
+    import pandas as pd
 
-    def at_plane(z_mm: float) -> Column:
-        def iou(row: Entry) -> str:
-            planes = {plane["z_mm"]: plane["object"].get("iou") for plane in row["planes"]}
-            return with_interval(planes.get(z_mm))
+    methods = of_cells["method"][of_cells["measure"] == decisive].unique()
+    table = of_cells[of_cells["method"].isin(methods)]
+    shown = [name for name in names if name in set(table["measure"])]
+    if OF_OBJECTS in shown:
+        shown = [name for name in shown if name != OF_ALL_PIXELS]
+    if decisive == "iou" and frame["z_mm"].nunique() > 1:
+        planes = means(frame[[*CELL, "seed", "identity", "z_mm", decisive]], (*CELL, "z_mm"))
+        planes = planes.assign(measure=[f"IoU, {z:g} mm" for z in planes["z_mm"]])
+        shown = [*planes["measure"].unique(), *shown]
+        table = pd.concat([table, planes])
+    parts = []
+    for name in shown:
+        digits = 2 if names.get(name, "").endswith((" px", "seconds")) else 3
+        parts.append(_with_texts(table[table["measure"] == name], ["light"], name, digits))
+    everything = pd.concat(parts) if parts else _with_texts(table, ["light"], "")
+    everything["measure"] = pd.Categorical(everything["measure"], shown)
+    title = "Removal of defocused points" if decisive == "iou" else "Depth"
+    return _pivoted(title, everything, ["light", "method"], "measure", lambda name: names.get(name, name))
 
-        return f"IoU, {z_mm:g} mm", iou
 
-    columns = [at_plane(z) for z in depths] if len(depths) > 1 else []
-    columns += _mean_columns(MEANS, results)
-    return _results("Removal of defocused points", results, columns, IOU, 1)
-
-
-def _depth(group: Entry) -> Table:
-    results = [row for row in group["results"] if "depth" in row]
-    columns = dict(_mean_columns(DEPTH_MEANS, results))
-    if OF_OBJECTS[0] in columns:
-        columns.pop(OF_ALL_PIXELS[0], None)
-    return _results("Depth", results, list(columns.items()), BAD_1PX, -1)
-
-
-def _bounds(group: Entry) -> Table:
-    """Bounds of each object and budget; they are the same for all methods that saw the same photons."""
-    bounds = {
-        (bound["name"], row["budget"]): bound | {"budget": row["budget"]}
-        for row in group["results"]
-        for bound in row.get("bounds", {}).get("objects", ())
-        if bound["depth_sigma_px"] is not None
-    }
-    columns: list[Column] = [
-        ("object", lambda bound: bound["name"]),
-        PHOTONS,
-        ("photons of the object", lambda bound: with_interval(bound["photons"], 0)),
-        ("standard deviation, px", lambda bound: with_interval(bound["depth_sigma_px"])),
+def rank_table(table: "DataFrame", measure: str, title: str, unit: str = "scenes") -> Table:
+    """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
+    rows = [
+        (
+            row.method,
+            light_name(row.light),
+            str(row.rank),
+            with_interval(row.mean, row.low, row.high),
+            with_interval(row.difference, row.difference_low, row.difference_high),
+            *("–" if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
+            str(row.n),
+        )
+        for row in lines_of(table)
     ]
-    title = "Least error of an object's depth (Cramér-Rao bound)"
-    return tabulated(title, columns, list(bounds.values()))
-
-
-def _paired(group: Entry, measure: str, name: str) -> Table:
-    columns: list[Column] = [
-        ("methods", lambda pair: " minus ".join(pair["methods"])),
-        PHOTONS,
-        ("seeds", lambda pair: str(pair["difference"]["n"])),
-        (f"difference of {name}", lambda pair: with_interval(pair["difference"])),
-        *P_VALUES,
-    ]
-    kind = "methods" if measure == "iou" else "methods of depth"
-    pairs = [pair for pair in group["paired"] if pair["measure"] == measure]
-    return tabulated(f"Pairs of {kind} on the same datasets", columns, pairs)
-
-
-def _table1(group: Entry) -> Table:
-    columns: list[Column] = [
-        ("object", lambda entry: entry["object"]),
-        ("plane", lambda entry: f"{entry['own_z_mm']:g} mm"),
-        PHOTONS,
-        ("lowest at its plane", lambda entry: f"{entry['lowest_at_own']} of {entry['seeds']}"),
-        ("smallest gap, bits", lambda entry: f"{entry['smallest_gap_bits']:.3f}"),
-        ("mean gap, bits", lambda entry: f"{entry['mean_gap_bits']:.3f}"),
-    ]
-    title = "Entropy of the objects (Table 1 of Muniraj et al. 2017)"
-    return tabulated(title, columns, group["table1"], words=2)
+    header = ("method", "photons", "rank", f"mean {NAMES[measure]}", "minus that of the best")
+    header += ("p", "least p possible", unit)
+    return Table(title, header, tuple(rows))

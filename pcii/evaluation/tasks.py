@@ -1,11 +1,11 @@
 """What an evaluation measures: every dataset at every light by every method, checked before any work."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pcii.base.errors import InputError
 from pcii.depth.depth_planes import check_range_mm
-from pcii.evaluation.method_names import Function, estimator_of, full_name, methods_for
+from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for
 from pcii.evaluation.rows import Key, identity_of
 from pcii.store.dataset import FULL_LIGHT, Budget, Dataset, budget_of
 from pcii.store.dataset_layout import RADIANCE, TRUTH
@@ -14,39 +14,35 @@ from pcii.store.suggested_depths import depth_range_of, planes_of
 
 @dataclass(frozen=True)
 class Task:
-    """A dataset, photon budget or full light, and method to score: full name, and function if it has one.
-
-    `z_mm` are depths to look at instead of those that the dataset's recipe names, if any.
-    """
+    """A dataset, light and method to score; `z_mm` are depths instead of those of the dataset, if any."""
 
     dataset: Dataset
-    budget: Budget
-    method: str
-    function: Function | None
-    z_mm: tuple[float, ...]
+    light: Budget
+    method: NamedMethod
+    z_mm: tuple[float, ...] = ()
 
     @property
     def key(self) -> Key:
         """Key of its row."""
-        return identity_of(self.dataset.manifest), self.budget, self.method, self.z_mm
+        return identity_of(self.dataset.manifest), self.light, self.method.name, self.z_mm
 
     @property
     def data(self) -> Dataset:
-        """The dataset with the photons of the budget, read anew, so that tasks keep nothing in memory."""
-        return self.dataset.at_budget(self.budget)
+        """The dataset in this light, read anew, so that tasks keep nothing in memory."""
+        return self.dataset.at_budget(self.light)
 
 
 def tasks_of(
     datasets: Sequence[Dataset],
-    methods: Mapping[str, Function | None],
-    budgets: Sequence[float | str],
+    methods: Sequence[NamedMethod],
+    lights: Sequence[float | str] = (),
     z_mm: Sequence[float] = (),
 ) -> list[Task]:
     """The tasks, dataset by dataset, each dataset once, at the depths `z_mm` or else those of its recipe.
 
-    Without `methods` all that can take the data; without `budgets` all that a dataset has, and full light if
-    it has radiance. Raises `InputError` for a dataset without truth, two views, depths or a named budget, and
-    for a named method that can take none of its data.
+    Without `methods` all that can take the data; without `lights` all that a dataset has. Raises `InputError`
+    for a dataset without truth, two views, depths or a named light, and for a named method that can take none
+    of its data.
     """
     tasks: dict[str, list[Task]] = {}
     for dataset in datasets:
@@ -56,72 +52,60 @@ def tasks_of(
             )
         if dataset.grid.view_count < 2:
             raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
-        lights = _lights(dataset, budgets)
-        by_light = {light: _names(dataset, methods, light, z_mm) for light in lights}
-        if methods:
-            _check_use(dataset, methods, lights)
-        names = [name for each in by_light.values() for name in each]
-        if z_mm or any(estimator_of(name) is None for name in names):
-            planes_of(dataset, z_mm)
-        if any(estimator_of(name) is not None for name in names):
-            z_range_mm = depth_range_of(dataset, z_mm)
-            try:
-                check_range_mm(dataset.grid, z_range_mm)
-            except InputError as fault:
-                raise InputError(f"{dataset.path}: {fault}") from None
-        each = [
-            Task(dataset, light, name, methods.get(name), tuple(z_mm))
-            for light in lights
-            for name in by_light[light]
+        own = [
+            Task(dataset, light, method, tuple(map(float, z_mm)))
+            for light in _check_lights(dataset, lights)
+            for method in methods or _methods_for(dataset, light, z_mm)
+            if method.takes(full_light=light == FULL_LIGHT)
         ]
-        tasks.setdefault(identity_of(dataset.manifest), each)
-    return [task for each in tasks.values() for task in each]
+        _check_methods(dataset, methods, own)
+        _check_depths(dataset, own, z_mm)
+        tasks.setdefault(identity_of(dataset.manifest), own)
+    return [task for own in tasks.values() for task in own]
 
 
 def lights_of(dataset: Dataset) -> list[Budget]:
     """Photon budgets of a dataset, and full light if it has radiance."""
-    found: list[Budget] = [*dataset.budgets]
-    if dataset.has(RADIANCE):
-        found.append(FULL_LIGHT)
-    return found
+    return [*dataset.budgets, *([FULL_LIGHT] if dataset.has(RADIANCE) else [])]
 
 
-def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
-    """The budgets to score at, with `FULL_LIGHT` for the radiance; `InputError` for one that is not there."""
-    own = lights_of(dataset)
-    if not own:
+def _check_lights(dataset: Dataset, lights: Sequence[float | str]) -> list[Budget]:
+    """The lights to score at, or all of the dataset; `InputError` for one that is not there."""
+    chosen: list[Budget] = [budget_of(light) if isinstance(light, str) else light for light in lights]
+    for light in chosen:
+        dataset.at_budget(light)
+    known = chosen or lights_of(dataset)
+    if not known:
         raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
-    chosen: list[Budget] = []
-    for budget in budgets:
-        named = budget_of(budget) if isinstance(budget, str) else budget
-        dataset.at_budget(named)
-        chosen.append(named)
-    return list(dict.fromkeys(chosen or own))
+    return list(dict.fromkeys(known))
 
 
-def _names(
-    dataset: Dataset, methods: Mapping[str, Function | None], light: Budget, z_mm: Sequence[float]
-) -> list[str]:
-    """Full names of the methods to apply at a light, each once."""
-    full_light = light == FULL_LIGHT
-    if methods:
-        functions = [name for name, function in methods.items() if function is not None]
-        found = (full_name(method, full_light=full_light, functions=functions) for method in methods)
-        return list(dict.fromkeys(name for name in found if name is not None))
+def _methods_for(dataset: Dataset, light: Budget, z_mm: Sequence[float]) -> list[NamedMethod]:
     # Removal is of sections at depths that are named.
     has_planes = bool(z_mm or dataset.analysis.get("z_mm"))
-    return [name for name in methods_for(full_light=full_light) if has_planes or estimator_of(name)]
+    names = methods_for(full_light=light == FULL_LIGHT)
+    return [NamedMethod(name) for name in names if has_planes or estimator_of(name)]
 
 
-def _check_use(dataset: Dataset, methods: Mapping[str, Function | None], lights: Sequence[Budget]) -> None:
-    """Raise `InputError` for a named method that takes neither kind of data that is scored."""
-    kinds = {light == FULL_LIGHT for light in lights}
+def _check_methods(dataset: Dataset, methods: Sequence[NamedMethod], tasks: Sequence[Task]) -> None:
+    used = {task.method.name for task in tasks}
     for method in methods:
-        if not any(_names(dataset, {method: methods[method]}, light, ()) for light in lights):
-            (full_light,) = kinds
-            lacking = "photon counts" if full_light else "radiance"
-            taken = "radiance" if full_light else "photon counts"
+        if method.name not in used:
+            kinds = ("photon counts", "radiance")
+            needed, there = kinds if method.takes(full_light=False) else kinds[::-1]
             raise InputError(
-                f"method: {method!r} needs {lacking}, and of {dataset.path} {taken} would be scored; use "
-                f"{', '.join(methods_for(full_light=full_light))}"
+                f"method: {method.name!r} needs {needed}, and of {dataset.path} {there} would be scored; use "
+                f"{', '.join(methods_for(full_light=there == 'radiance'))}"
             )
+
+
+def _check_depths(dataset: Dataset, tasks: Sequence[Task], z_mm: Sequence[float]) -> None:
+    """Raise `InputError` for depths that methods need and nobody names, or cannot be searched."""
+    of_depth = [estimator_of(task.method.name) is not None for task in tasks]
+    if z_mm or not all(of_depth):
+        planes_of(dataset, z_mm)
+    if any(of_depth):
+        try:
+            check_range_mm(dataset.grid, depth_range_of(dataset, z_mm))
+        except InputError as fault:
+            raise InputError(f"{dataset.path}: {fault}") from None

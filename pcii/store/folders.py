@@ -5,13 +5,13 @@ SHA-256. That of a dataset or a collection ends in "sha256", a checksum of itsel
 with 64 zeros in that place.
 
 results.json      of results: their dataset by name and identity, the light, the software
-evaluation.json   of an evaluation: the figures of its tables; beside it rows.jsonl, a line of JSON for each
-                  dataset, budget and method
+evaluation.json   of an evaluation: what measured its rows; beside it rows.jsonl, a line of JSON for each
+                  dataset, light and method
 """
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -216,7 +216,7 @@ RESULTS_FOLDER = FolderKind(
 EVALUATION_FOLDER = FolderKind(
     "evaluation",
     EVALUATION,
-    version=1,
+    version=2,
     absent="unfinished; the same `pcii evaluate` command goes on from here",
     remedy="repeat the `pcii evaluate` command, which writes it again",
     marks=frozenset({ROWS}),
@@ -228,16 +228,6 @@ def read_results(out: Path) -> "ResultsManifest":
     from pcii.store.manifests import ResultsManifest
 
     return RESULTS_FOLDER.read(out, ResultsManifest)
-
-
-def is_evaluation(path: Path) -> bool:
-    """Whether a folder holds an evaluation, finished or not."""
-    return (path / ROWS).exists() or (path / EVALUATION).exists()
-
-
-def seal_evaluation(out: Path, summary: Mapping[str, Any], pages: Sequence[str]) -> None:
-    """Write evaluation.json: this summary of the rows, and the hashes of the rows and of the named pages."""
-    EVALUATION_FOLDER.write(out, {**summary, "files": list_files(out, [ROWS, *pages])})
 
 
 def read_evaluation(out: Path) -> "EvaluationManifest":

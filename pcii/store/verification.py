@@ -21,10 +21,10 @@ from pcii.store.folders import (
     EVALUATION_FOLDER,
     RESULTS,
     RESULTS_FOLDER,
+    ROWS,
     Files,
     FolderKind,
     check_file,
-    is_evaluation,
     read_evaluation,
     read_results,
     unlisted_files,
@@ -103,7 +103,7 @@ def _kind_and_files(path: Path) -> tuple[FolderKind, Files]:
     if not (path / MANIFEST).exists():
         if (path / RESULTS).exists():
             return RESULTS_FOLDER, read_results(path).files
-        if is_evaluation(path):
+        if (path / ROWS).exists():
             return EVALUATION_FOLDER, read_evaluation(path).files
     return DATASET_FOLDER, read_manifest(path).files
 

@@ -9,6 +9,7 @@ from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.exchange.dataset_card import write_card
 from pcii.store.collection import Collection, open_collection
+from pcii.store.manifests import DatasetManifest
 from simgen.app.pictures import Preview, check_picture_path, draw_preview
 from simgen.check.targets import load_target
 from simgen.dataset import dataset_collection as collections
@@ -40,7 +41,7 @@ def load_scene(
     return scene_lookup.load_scene(str(scene), number=number)[0]
 
 
-def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> dict[str, Any]:
+def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> DatasetManifest:
     """Make the dataset of a recipe in the folder `out`, or go on with it; its manifest.
 
     What `simgen generate` does: `recipe` is one that was loaded, a path, the name of one that ships, or that

@@ -1,5 +1,6 @@
 """Making the public benchmark: all of its datasets as one collection, and their certificate."""
 
+import csv
 import subprocess
 import sys
 import tempfile
@@ -25,7 +26,7 @@ from pcii.store.benchmark_layout import (
     published_certificate,
 )
 from pcii.store.collection import BENCHMARK_FIELDS, IN_FRAMES, Half, open_collection
-from pcii.store.folders import hash_json, read_evaluation
+from pcii.store.folders import hash_json
 from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection
@@ -172,8 +173,9 @@ def reference_scores(benchmark: Path, halves: Iterable[Half]) -> dict[str, Mappi
             program = "import sys; from pcii.app.commands import main; sys.exit(main())"
             if subprocess.run([sys.executable, "-c", program, *words], stdout=subprocess.DEVNULL).returncode:
                 raise InputError(f"certificate: `pcii {' '.join(words)}` failed, as said above")
-            for group in read_evaluation(out)["groups"]:
-                (result,) = group["results"]
-                if (iou := result["object"]["iou"]) is not None and iou["interval"] is not None:
-                    scores[group["title"]] = {"mean": iou["mean"], "interval": iou["interval"]}
+            with (out / "means.csv").open(encoding="utf-8", newline="") as file:
+                for row in csv.DictReader(file):
+                    if row["measure"] == "iou" and row["low"]:
+                        interval = [float(row["low"]), float(row["high"])]
+                        scores[row["scene"]] = {"mean": float(row["mean"]), "interval": interval}
     return scores

@@ -10,7 +10,7 @@ from twins import even_light, unit_grid
 import pcii
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function
-from pcii.evaluation.method_names import named_functions
+from pcii.evaluation.method_names import named_methods
 
 CODE = """
 from pcii import Segmented
@@ -36,7 +36,11 @@ def test_a_function_of_a_file_or_a_module_is_a_method(
     assert pcii.segment(counts, 1.0, method=name).method == "mine"
     function = load_function(name)
     assert pickle.loads(pickle.dumps(function)) is function
-    assert named_functions([name, f"depth:{name}"]) == {"remove": function, "depth:remove": function}
+    methods = named_methods([name, f"depth:{name}"])
+    assert [(method.name, method.function) for method in methods] == [
+        ("remove", function),
+        ("depth:remove", function),
+    ]
     del sys.modules["own_removal"]
 
 

@@ -21,13 +21,11 @@ from pcii.app.report import write_report
 from pcii.base.plain_text import in_markdown, visible
 from pcii.evaluation import pages as pages_module
 from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.evaluation_pages import accuracy_plots, write_evaluation
-from pcii.evaluation.pages import page
-from pcii.evaluation.rows import claim_rows
-from pcii.evaluation.summary import summarise
+from pcii.evaluation.pages import MAX_DETAILED_SCENES, page, write_evaluation
+from pcii.evaluation.provenance import origin_of
+from pcii.evaluation.rows import frame_of
 from pcii.removal.methods import METHODS
-from pcii.store.dataset import open_dataset
-from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.store.dataset import FULL_LIGHT, open_dataset
 from pcii.types.estimates import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
@@ -45,6 +43,9 @@ POLICIES = {
     "report.html": POLICY.replace("img-src", f"script-src 'sha256-{SCRIPT_HASH}'; img-src"),
     "evaluation.html": POLICY,
 }
+
+
+PICTURE = "data:image/png;base64,iVBORw0KGgo="
 
 
 class Read(HTMLParser):
@@ -83,21 +84,22 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     with pytest.MonkeyPatch.context() as patch:
         for name in NAMES:
             patch.setitem(METHODS, name, named(name))
-        return analyse(dataset, planes_of(dataset, None), depth_range_of(dataset), NAMES)
+        return analyse(dataset, None, methods=NAMES)
 
 
 @pytest.fixture(scope="module")
 def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The report, and the evaluation of groups, objects, methods and datasets of such names."""
     out = tmp_path_factory.mktemp("pages")
-    claim_rows(out)
     write_report(out / "report.html", outcome)
-    evaluation = summarise([row for name in NAMES for row in rows_of(name)])
-    drawn = accuracy_plots(evaluation["groups"][0], NAMES[-2:])  # for all: a plot takes half a second
+    rows = [row for name in NAMES for row in rows_of(name)]
+    (out / "rows.jsonl").touch()
     with pytest.MonkeyPatch.context() as patch:
-        for plots in ("accuracy_plots", "calibration_plots"):
-            patch.setattr(f"pcii.evaluation.evaluation_pages.{plots}", lambda *_: drawn)
-        write_evaluation(out, evaluation)
+        # A plot takes half a second.
+        patch.setattr(pages_module, "accuracy_plots", lambda *_: PICTURE)
+        patch.setattr(pages_module, "calibration_plots", lambda *_: PICTURE)
+        patch.setattr(pages_module, "MAX_DETAILED_SCENES", 2 * len(NAMES))
+        write_evaluation(out, frame_of(rows), origin_of(rows))
     files = ("report.html", "evaluation.html", "evaluation.md")
     return {name: (out / name).read_bytes().decode() for name in files}
 
@@ -179,7 +181,6 @@ def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None
         for scene in (shown, "other"):
             # The heading, and by method in both overviews.
             assert texts.count(f"{shown} (scene={scene})") == 1 + 2 + 1
-        assert f"IoU of {shown} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
 
 
 def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) -> None:
@@ -198,7 +199,7 @@ def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) ->
         read = html.unescape(re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", in_markdown(name)))
         assert read == visible(name)
     lines = [line for line in text.splitlines() if line]
-    assert all(re.match(r"\||#+ |IoU of |Scores |p: |Depth: |In bold: ", line) for line in lines)
+    assert all(re.match(r"\||#+ |Scores |p: |Depth: |In bold: |Over all scenes: ", line) for line in lines)
 
 
 def test_what_a_page_lacks_is_no_empty_place() -> None:
@@ -209,9 +210,32 @@ def test_what_a_page_lacks_is_no_empty_place() -> None:
 def test_names_of_files_that_are_no_characters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(METHODS, "two rows", two_rows)
     data = write_dataset(tmp_path / "data \udcff", 1, {OWN: 5}, title="half \ud800")
-    (group,) = evaluate([data], tmp_path / "out", methods=["two rows"])["groups"]
-    assert (group["datasets"], group["title"]) == (1, "half \ud800")
-    assert evaluate([data], tmp_path / "out", methods=["two rows"])["groups"] == [group]
+    for _ in range(2):
+        frame = evaluate([data], tmp_path / "out", methods=["two rows"]).frame
+        assert set(frame["scene"]) == {"half \\ud800"}
+
+
+def test_a_page_of_200_scenes_is_small_and_in_their_order(tmp_path: Path) -> None:
+    lights, methods = (30.0, 100.0, 300.0, 1000.0, FULL_LIGHT), [f"depth:{letter}" for letter in "abcde"]
+    rows = [
+        {"dataset": "d", "identity": f"{scene} {seed}", "seed": seed, "recipe": str(scene), "seconds": 1.0}
+        | {"title": f"scene {scene}", "budget": light, "method": method, "photons_per_view": 1.0}
+        | {"depth": {"bad_1px": (scene + seed + number) / 210}}
+        for scene in range(200)[::-1]
+        for seed in (1, 2)
+        for light in lights
+        for number, method in enumerate(methods)
+    ]
+    (tmp_path / "rows.jsonl").touch()
+    write_evaluation(tmp_path, frame_of(rows), origin_of(rows))
+    text = (tmp_path / "evaluation.html").read_text()
+    assert len(text) < 1_000_000
+    assert text.count("data:image/png") == 1
+    scenes = re.findall(r">(scene \d+)</td>", text)
+    assert list(dict.fromkeys(scenes)) == [f"scene {number}" for number in range(200)[::-1]]
+    # 0 to 199 over 210, and half of 1 and 2: the mean of all scenes.
+    assert f"<td>{(199 / 2 + 1.5) / 210:.3f} (" in text
+    assert MAX_DETAILED_SCENES < 200
 
 
 def root_element(file: Path) -> str:

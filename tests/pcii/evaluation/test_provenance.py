@@ -1,9 +1,11 @@
-"""What other software made is measured again by an evaluation, and it is said why."""
+"""What other software made is made again, in evaluations and in results alike, and it is said why."""
 
 import ast
+import hashlib
+import html
 import re
 import sys
-from importlib.metadata import packages_distributions
+from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,8 @@ from tiny_datasets import OWN, write_dataset
 
 import pcii
 from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.provenance import software_of
-from pcii.evaluation.rows import all_rows, append_row, claim_rows
+from pcii.evaluation.provenance import machine, software_of
+from pcii.evaluation.rows import read_rows, writing_rows
 from pcii.store.software import differences, hash_of_source
 
 COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
@@ -81,30 +83,36 @@ def test_rows_of_other_software_are_measured_again(
     data = write_dataset(tmp_path / "data", 1, {OWN: 5})
     methods = ["brightness", "learned", "depth:near"]
 
-    def again() -> list[dict[str, object]]:
-        return evaluate([data], out, methods=methods)["again"]
+    def made_again() -> tuple[str, ...]:
+        return evaluate([data], out, methods=methods).made_again
 
     strange(package, monkeypatch)
-    assert again() == again() == []
+    assert made_again() == made_again() == ()
     before = (out / "rows.jsonl").read_bytes()
     strange(package, monkeypatch, change)
-    (made,) = again()
-    assert made == made | {"rows": 2, "methods": ["depth:near", "learned"]}
-    assert re.fullmatch(CHANGES[change][2], str(made["why"]))
+    (sentence,) = made_again()
+    assert re.fullmatch(f"2 scores of depth:near, learned, since {CHANGES[change][2]}", sentence)
     assert (out / "rows.jsonl").read_bytes().startswith(before)
-    with all_rows(out) as rows:
-        assert len(rows) == 3
-        assert {row["method"]: row["software"] for row in rows}["learned"] == software_of("learned")
-    assert again() == []
+    rows = read_rows(out)
+    assert len(rows) == 3
+    assert {row["method"]: row["software"] for row in rows}["learned"] == software_of("learned")
+    assert made_again() == ()
 
 
-def test_rows_of_which_the_software_is_not_known_are_measured_again(tmp_path: Path) -> None:
-    """As those of an earlier release."""
+def test_the_page_can_be_cited_and_says_what_made_it(tmp_path: Path) -> None:
     data, out = write_dataset(tmp_path / "data", 1, {OWN: 5}), tmp_path / "out"
-    evaluate([data], out, methods=["brightness"])
-    with all_rows(out) as rows:
-        (row,) = rows
-    claim_rows(tmp_path / "earlier")
-    append_row(tmp_path / "earlier", {name: row[name] for name in row if name != "software"})
-    (made,) = evaluate([data], tmp_path / "earlier", methods=["brightness"])["again"]
-    assert made["why"] == "what makes them is not known"
+    evaluate([data], out, methods=["brightness", "variance"])
+    rows = read_rows(out)
+    earlier = tmp_path / "earlier"
+    with writing_rows(earlier) as file:
+        file.add(rows[0] | {"date": "2026-01-10", "software": {"numpy": "1.0"}})
+        file.add({name: value for name, value in rows[1].items() if name != "software"})
+    (sentence,) = evaluate([data], earlier, methods=["variance"]).made_again
+    assert sentence == "1 scores of variance, since what makes them is not known"
+    text, page = ((earlier / f"evaluation.{ending}").read_text() for ending in ("md", "html"))
+    digest = hashlib.sha256((earlier / "rows.jsonl").read_bytes()).hexdigest()
+    for cited in ("2 methods on 1 dataset of 1 scene", "2026-01-10 to 20", machine(), digest):
+        assert cited in html.unescape(page)
+        assert cited in text.replace("\\", "")
+    assert f"| numpy | {version('numpy')} (1 rows); 1.0 (1 rows) |" in text
+    assert "Not all rows are of the same software (numpy): name all datasets and methods again." in text

@@ -11,7 +11,7 @@ import numba as nb
 import pytest
 from slow_clock import SlowClock
 
-from pcii.evaluation.timing import timed
+from pcii.evaluation.measurement import timed
 
 NAMES = count()
 LOOP = """

@@ -12,7 +12,7 @@ from tiny_datasets import OWN, write_dataset
 from pcii.base.errors import InputError
 from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import MANIFEST, read_manifest
-from pcii.store.folders import EVALUATION, RESULTS, RESULTS_FOLDER, ROWS, list_files, seal_evaluation
+from pcii.store.folders import EVALUATION, EVALUATION_FOLDER, RESULTS, RESULTS_FOLDER, ROWS, list_files
 from pcii.store.verification import verify, verify_and_tell
 
 
@@ -31,7 +31,7 @@ def make_evaluation(root: Path) -> Path:
     root.mkdir()
     (root / ROWS).write_text('{"identity": "a"}\n{"identity": "b"}\n')
     (root / "evaluation.md").write_text("# Evaluation")
-    seal_evaluation(root, {"groups": []}, ["evaluation.md"])
+    EVALUATION_FOLDER.write(root, {"files": list_files(root, [ROWS, "evaluation.md"])})
     return root
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcii.types.bayer import colour_index
-from pcii.types.photon_limit import Light, photon_rates, scope_energies, sense
+from pcii.types.photon_limit import Light, Scope, photon_rates, scope_energies, sense
 from simgen.sensor.detector import draw_counts, fixed_totals
 from simgen.spec.recipe import Photons
 
@@ -26,7 +26,7 @@ def test_poisson_counts_have_mean_and_variance_of_their_rate(rate: float) -> Non
 
 
 @pytest.mark.parametrize("scope", ["view", "channel", "scene"])
-def test_multinomial_totals_are_exact(scope: str) -> None:
+def test_multinomial_totals_are_exact(scope: Scope) -> None:
     photons = Photons.model_validate({"budget": 700, "scope": scope, "statistics": "multinomial"})
     raws = [ramp(), 3 * ramp()]
     energies = np.array([scope_energies(raw, "GRBG", scope) for raw in raws])

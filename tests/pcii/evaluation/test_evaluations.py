@@ -1,0 +1,404 @@
+"""Evaluations of made-up methods, every figure by hand; killed, shared, locked and refused."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numba as nb
+import numpy as np
+import pandas as pd
+import pytest
+from slow_clock import SlowClock
+from stored_datasets import rewrite_manifest
+from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
+
+from pcii.app import commands as cli
+from pcii.base import command_line
+from pcii.base.errors import InputError
+from pcii.base.executor import Executor
+from pcii.evaluation import measurement
+from pcii.evaluation.comparison import Evaluation, evaluate, find_datasets
+from pcii.evaluation.rows import read_frame, read_rows, writing_rows
+from pcii.removal.methods import METHODS
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest
+from pcii.store.folders import ROWS
+from pcii.store.verification import verify
+from pcii.types.estimates import DepthMap
+
+HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
+FAKES = ("by count", "two rows")
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Makes the fake methods known; every call of one is noted."""
+    noted: list[str] = []
+    for method in (by_count, two_rows):
+        name = method.__name__.replace("_", " ")
+
+        def noting(counts: Any, z_mm: Any, name: str = name, method: Any = method) -> Any:
+            noted.append(name)
+            return method(counts, z_mm)
+
+        monkeypatch.setitem(METHODS, name, noting)
+    return noted
+
+
+def write_series(folder: Path) -> Path:
+    for seed, (own, nested) in HITS.items():
+        write_dataset(folder / f"seed_{seed}", seed, {NESTED: nested, OWN: own})
+    return folder
+
+
+@pytest.fixture
+def series(tmp_path: Path) -> Path:
+    return write_series(tmp_path / "data")
+
+
+@pytest.fixture(scope="module")
+def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
+    """The fake methods compared on the series."""
+    folder = tmp_path_factory.mktemp("evaluated")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, method in zip(FAKES, (by_count, two_rows), strict=True):
+            patch.setitem(METHODS, name, method)
+        return evaluate([write_series(folder / "data")], folder / "out", methods=FAKES)
+
+
+def mean_of(evaluation: Evaluation, light: object, method: str, measure: str) -> Any:
+    """Row of `means` of one light, method and measure."""
+    table = evaluation.means()
+    is_it = (table["light"] == light) & (table["method"] == method) & (table["measure"] == measure)
+    (row,) = table[is_it].itertuples()
+    return row
+
+
+def test_every_figure_by_hand(evaluated: Evaluation) -> None:
+    frame = evaluated.frame
+    # Three datasets in two lights, by two methods, at two planes.
+    assert len(frame) == 3 * 2 * 2 * 2
+    assert frame["light"].cat.categories.tolist() == [NESTED, OWN]
+    assert set(frame["scene"]) == {"by hand"}
+    is_own = (frame["light"] == OWN) & (frame["method"] == "by count")
+    own: Any = frame[is_own].set_index(["z_mm", "seed"])
+    assert own.loc[1.0, "iou"].to_dict() == {3: 0.6, 4: 0.8, 5: 0.7}
+    assert own.loc[2.0, "iou"].to_dict() == {3: 1.0, 4: 1.0, 5: 1.0}
+    assert own.loc[1.0, "objects"].tolist() == ["near"] * 3
+    assert own["photon_recall"].isna().all()  # these photons have no known origin
+    # Over both planes 0.8, 0.9, 0.85: half width 4.302653 * 0.05 / sqrt(3) = 0.124207.
+    iou = mean_of(evaluated, OWN, "by count", "iou")
+    assert (iou.n, iou.mean) == (3, pytest.approx(0.85))
+    assert (iou.low, iou.high) == (pytest.approx(0.725793, abs=1e-6), pytest.approx(0.974207, abs=1e-6))
+    assert mean_of(evaluated, OWN, "by count", "pixel_iou").mean == iou.mean
+    # Of 24 pixels the near object is 10, the far one 0, in every dataset.
+    assert mean_of(evaluated, OWN, "two rows", "iou").mean == pytest.approx(10 / 24 / 2)
+    assert mean_of(evaluated, OWN, "two rows", "claimed_share")[-4:] == (3, 0.25, 0.25, 0.25)
+    # Each object is flat and at its plane, so who knows the depths makes no mistake.
+    assert mean_of(evaluated, OWN, "two rows", "pixel_iou_oracle").mean == 1.0
+    # 96 photons in the last view and 20 + 6, 8, 7 in the first, of four views.
+    photons = mean_of(evaluated, OWN, "by count", "photons_per_view")
+    assert photons.mean == pytest.approx((96 + 20 + 7) / 4)
+
+
+def test_the_files_hold_the_same_figures(evaluated: Evaluation) -> None:
+    out = evaluated.folder
+    assert verify(out) == len({ROWS, "evaluation.html", "evaluation.md", "means.csv"})
+    pd.testing.assert_frame_equal(read_frame(out), evaluated.frame)
+    table = pd.read_csv(out / "means.csv")
+    iou = table[(table["measure"] == "iou") & (table["light"] == OWN)].set_index("method")
+    assert iou.at["by count", "mean"] == mean_of(evaluated, OWN, "by count", "iou").mean
+    text = (out / "evaluation.md").read_text()
+    # Equal differences of the nested light, 1 - 10 / 48, have an interval without width.
+    assert (
+        "| two rows | 20 | 2 | 0.208 (0.208 to 0.208) | -0.792 (-0.792 to -0.792) | 0.25 | 0.25 | 3 |" in text
+    )
+    assert "| by hand | by count | **1.000 (1.000 to 1.000)** | **0.850 (0.726 to 0.974)** |" in text
+
+
+def entropy_row(bits_of: dict[str, tuple[float, float]]) -> dict[str, Any]:
+    planes = [
+        {"z_mm": z, "object": name, "truth": "object", "iou": 0.5}
+        for z, name in ((540.0, "ball"), (620.0, "bird"))
+    ]
+    objects = [
+        {"name": name, "entropy": dict(zip(("540", "620"), bits, strict=True))}
+        for name, bits in bits_of.items()
+    ]
+    head = {"dataset": "d", "identity": "1", "recipe": "r", "title": "t", "seed": 1, "budget": 1000.0}
+    return head | {
+        "method": "m",
+        "photons_per_view": 1.0,
+        "seconds": 1.0,
+        "planes": planes,
+        "objects": objects,
+    }
+
+
+def test_table_1_is_the_gap_of_the_entropies(tmp_path: Path) -> None:
+    with writing_rows(tmp_path / "out") as file:
+        file.add(entropy_row({"ball": (1.0, 1.5), "bird": (1.0, 1.25)}))
+    assert read_frame(tmp_path / "out")["entropy_gap_bits"].tolist() == [0.5, -0.25]
+
+
+def change_recipe(dataset: Path, **settings: Any) -> None:
+    manifest = read_manifest(dataset)
+    recipe = manifest.recipe | settings
+    rewrite_manifest(dataset, recipe=recipe, identity=f"{manifest.identity}{settings}")
+
+
+def test_scenes_come_in_the_order_of_the_datasets_with_the_settings_that_differ(
+    tmp_path: Path, calls: list[str]
+) -> None:
+    data = [write_dataset(tmp_path / f"data {number}", 1, {OWN: 2 + number}) for number in range(4)]
+    change_recipe(data[1], scene="another", grid={"rows": 4}, exposure=None)
+    change_recipe(data[2], scene="another", grid={"rows": 6}, exposure=None)
+    change_recipe(data[3], title="of its own")  # the manifest's `title` stays the same
+    other = write_dataset(tmp_path / "other", 1, {OWN: 9}, title="other")
+    evaluation = evaluate([other, *data[::-1]], tmp_path / "out", methods=["by count"])
+    labels = list(evaluation.frame["scene"].cat.categories)
+    ious = evaluation.frame.groupby("scene", observed=True)["iou"].mean().round(6).tolist()
+    assert ious == [0.95, 0.75, 0.7, 0.65, 0.6]
+    assert labels[0] == "other"
+    assert labels[2] == "by hand (scene=another, grid.rows=6, exposure=null)"
+    # These two have the same settings, and differ by the hashes of their recipes.
+    assert all(re.fullmatch(r"by hand \(scene=by hand, recipe [0-9a-f]{8}\)", labels[n]) for n in (1, 4))
+    # Scenes of earlier runs come last.
+    again = evaluate(data[:1], tmp_path / "out", methods=["by count"])
+    assert list(again.frame["scene"].cat.categories) == [labels[4], *labels[:4]]
+
+
+def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop, clock, calls = nb.njit(lambda n: n + 1), SlowClock(monkeypatch), 0
+
+    def late(counts: Any, sections: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if counts.total != first_total:  # of the first dataset: the others take another path
+            clock.go_on(1 if loop.signatures else 100)
+            loop(counts.total)
+        clock.go_on(1)
+        return by_count(counts, sections)
+
+    monkeypatch.setitem(METHODS, "late", late)
+    first_total = open_dataset(series / "seed_3").counts.total
+    evaluation = evaluate([series], tmp_path / "out", methods=["late"], budgets=[OWN])
+    assert calls == 5  # three, the warm-up and the one that compiled
+    assert sorted(evaluation.frame["seconds"]) == [1, 1, 2, 2, 2, 2]
+
+
+def test_a_depth_map_without_estimates_is_reported_as_such(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = DepthMap(np.full((8, 12), np.nan), np.zeros((8, 12)))
+    monkeypatch.setattr(measurement, "estimate_depth", lambda *_, **__: nothing)
+    frame = evaluate([series], tmp_path / "out", methods=["depth"], budgets=[OWN]).frame
+    assert frame[["ece", "mae_mm"]].isna().all(axis=None)
+    assert frame["coverage"].tolist() == [0.0] * 3
+    assert frame["bad_1px"].tolist() == [1.0] * 3
+    assert "### Depth" in (tmp_path / "out" / "evaluation.md").read_text()
+
+
+def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    evaluate([series], tmp_path / "out", methods=["by count"])
+    assert len(calls) == 3 * 2 + 2  # a row for each dataset and light, and one call that warms up by light
+    first = read_rows(tmp_path / "out")
+    stages = list[tuple[str, int, int]]()
+    methods = [*FAKES, "by count"]
+    evaluate(
+        [series, series / "seed_3"], tmp_path / "out", methods=methods, report=lambda *s: stages.append(s)
+    )
+    assert stages[0] == ("scores of an earlier run", 6, 6)
+    assert stages[-1] == ("scores", 6, 6)
+    assert set(calls[8:]) == {"two rows"}
+    assert read_rows(tmp_path / "out")[:6] == first
+
+
+def check_same_but_for_seconds(one: Evaluation, other: Evaluation) -> None:
+    first, second = (each.frame.drop(columns="seconds") for each in (one, other))
+    pd.testing.assert_frame_equal(first, second)
+
+
+def near_plane(data: Any, z_range_mm: tuple[float, float]) -> DepthMap:
+    return DepthMap(np.ones((8, 12)), np.ones((8, 12)))
+
+
+def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path: Path) -> None:
+    """By one process and by two, which share the work."""
+    methods = [by_count, ("rows", two_rows), ("depth:near", near_plane), "variance"]
+    asked: dict[str, Any] = {"methods": methods, "budgets": [OWN]}
+    evaluation = evaluate([series], tmp_path / "alone", **asked)
+    assert mean_of(evaluation, OWN, "by_count", "iou").mean == pytest.approx(0.85)
+    assert mean_of(evaluation, OWN, "rows", "iou").mean == pytest.approx(10 / 48)
+    assert mean_of(evaluation, OWN, "depth:near", "bad_1px").mean == 0.5
+    shared = evaluate([series], tmp_path / "out", **asked, executor=Executor(2))
+    check_same_but_for_seconds(shared, evaluation)
+    # Nobody knows what they follow from, so they are measured whenever they are named.
+    again = evaluate([series], tmp_path / "out", **asked).made_again
+    assert again == ("9 scores of by_count, depth:near, rows, since what makes them is not known",)
+    assert evaluate([series], tmp_path / "out", methods=["variance"], budgets=[OWN]).made_again == ()
+
+
+def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = "import tiny_datasets\ndef mine(counts, sections):\n"
+    code += "    return tiny_datasets.two_rows(counts, sections)\n"
+    monkeypatch.chdir(tmp_path)
+    Path("own_method.py").write_text(code)
+    asked: dict[str, Any] = {"methods": ["own_method.py:mine"], "budgets": [OWN]}
+    evaluation = evaluate([series], "out", **asked, executor=Executor(2))
+    assert mean_of(evaluation, OWN, "mine", "iou").mean == pytest.approx(10 / 48)
+    assert evaluate([series], "out", **asked).made_again == ()
+    Path("own_method.py").write_text(code + "\n")
+    (again,) = evaluate([series], "out", **asked).made_again
+    assert again == "3 scores of mine, since the source of own_method.py has changed"
+
+
+@pytest.mark.parametrize(
+    ("methods", "sentence"),
+    [
+        ([by_count, ("by_count", two_rows)], "methods: 'by_count' is there twice"),
+        (
+            [("likelihood", by_count)],
+            "methods: the name 'likelihood' is taken; give the function another name",
+        ),
+        (
+            [("mine", 3)],
+            r"methods: expected names, functions, or pairs \(name, function\), got \('mine', 3\)",
+        ),
+        (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:focus"),
+        (["no_such_file.py:mine"], "method: 'no_such_file.py:mine' cannot be loaded: FileNotFoundError"),
+        (["json:nothing"], "method: 'json:nothing' cannot be loaded: AttributeError"),
+    ],
+)
+def test_methods_that_cannot_be_compared_are_refused(
+    series: Path, tmp_path: Path, methods: list[Any], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=f"^{sentence}"):
+        evaluate([series], tmp_path / "out", methods=methods)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("left", [1, -1])
+def test_a_killed_evaluation_goes_on_where_it_was(
+    evaluated: Evaluation, tmp_path: Path, calls: list[str], left: int
+) -> None:
+    out = tmp_path / "killed"
+    shutil.copytree(evaluated.folder, out)
+    *lines, last, _ = (out / ROWS).read_bytes().split(b"\n")
+    (out / ROWS).write_bytes(b"\n".join(lines) + b"\n" + last[:left])  # killed in the middle of a line
+    again = evaluate([evaluated.folder.parent / "data"], out, methods=FAKES)
+    assert len(calls) == 2  # the torn row, and its warm-up
+    check_same_but_for_seconds(again, evaluated)
+    assert len((out / ROWS).read_bytes().splitlines()) == len(lines) + 1
+
+
+def test_a_run_that_fails_keeps_what_it_measured_and_a_second_one_is_refused(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+
+    def breaks(counts: Any, sections: Any) -> Any:
+        with pytest.raises(InputError, match="out: another run writes here; wait for it, or name another"):
+            evaluate([series], out, methods=["variance"])
+        if counts.total == open_dataset(series / "seed_5").counts.total:
+            raise InputError("this photon is one too many")
+        return by_count(counts, sections)
+
+    monkeypatch.setitem(METHODS, "breaks", breaks)
+    with pytest.raises(InputError, match="one too many"):
+        evaluate([series], out, methods=["breaks"], budgets=[OWN])
+    assert len(read_rows(out)) == 2
+    with pytest.raises(InputError, match=r"out: unfinished; the same `pcii evaluate` command"):
+        verify(out)
+
+
+def test_a_damaged_line_is_named(evaluated: Evaluation, tmp_path: Path) -> None:
+    lines = (evaluated.folder / ROWS).read_bytes().splitlines(keepends=True)
+    (tmp_path / ROWS).write_bytes(b"".join([*lines[:2], lines[2][5:], *lines[3:]]))
+    with pytest.raises(InputError, match=r"rows.jsonl: line 3 is damaged; delete that line"):
+        read_rows(tmp_path)
+
+
+def test_datasets_are_found_in_the_order_of_their_seeds(tmp_path: Path) -> None:
+    for seed in (2, 10, 9):
+        write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {OWN: 5})
+    (tmp_path / "data" / "notes").mkdir()
+    assert [path.name for path in find_datasets([tmp_path / "data"])] == ["seed_2", "seed_9", "seed_10"]
+
+
+def test_what_cannot_be_evaluated_is_refused_before_any_work(
+    series: Path, tmp_path: Path, calls: list[str]
+) -> None:
+    out = tmp_path / "out"
+    (tmp_path / "empty").mkdir()
+    for sentence, datasets in (
+        ("no such dataset folder", [tmp_path / "nowhere"]),
+        ("neither a finished dataset nor", [tmp_path / "empty"]),
+        ("at least one", []),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            evaluate(datasets, out, methods=FAKES)
+    with pytest.raises(InputError, match="no photons of budget 7"):
+        evaluate([series], out, methods=FAKES, budgets=[7])
+    with pytest.raises(InputError, match="holds something else"):
+        evaluate([series], series, methods=FAKES)
+    files = read_manifest(series / "seed_3").files
+    files = {name: entry for name, entry in files.items() if not name.startswith(TRUTH)}
+    rewrite_manifest(series / "seed_3", files=files)
+    with pytest.raises(InputError, match="has no truth"):
+        evaluate([series], out, methods=FAKES)
+    (series / "seed_4" / MANIFEST).unlink()
+    with pytest.raises(InputError, match=r"seed_4: not a finished dataset"):
+        evaluate([series], out)
+    assert calls == []
+    assert not out.exists()
+
+
+def test_depths_are_given_where_the_recipe_names_none(
+    series: Path, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    for path in find_datasets([series]):
+        rewrite_manifest(path, analysis={})
+    command = ["evaluate", str(series), "-o", str(out), "--method", "by count"]
+    assert command_line.run(cli.app, command) == 2
+    assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
+    assert command_line.run(cli.app, [*command, "--z-mm", "1", "--z-mm", "2"]) == 0
+    calls.clear()
+    evaluation = evaluate([series], out, methods=["by count"], z_mm=[1, 2])
+    assert calls == []  # nothing is measured twice
+    assert mean_of(evaluation, OWN, "by count", "iou").mean == pytest.approx(0.85)
+    # Other depths are another scene, with figures of their own.
+    frame = evaluate([series], out, methods=["by count"], z_mm=[1]).frame
+    depths = frame.groupby("scene", observed=True)["z_mm"].unique().map(sorted).to_dict()
+    assert depths == {"by hand (analysis.z_mm=[1.0])": [1], "by hand (analysis.z_mm=[1.0, 2.0])": [1, 2]}
+
+
+def test_the_command_and_its_page(
+    evaluated: Evaluation, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(evaluated.folder, out)
+    command = ["evaluate", str(evaluated.folder.parent / "data"), "-o", str(out), "--method", "by count"]
+    command += ["--method", "two rows"]
+    assert command_line.run(cli.app, command) == 0
+    assert "evaluation.html" in capsys.readouterr().out
+    page = (out / "evaluation.html").read_text()
+    assert page.count("data:image/png;base64,") == 1
+    assert "<script" not in page
+    assert "://" not in page
+    assert str(tmp_path) not in page
+    assert "0.850 (0.726 to 0.974)" in page
+    assert calls == []
+    other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
+    assert command_line.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
+    assert len(read_rows(out)) == 12 + 2
+    assert json.loads((out / "evaluation.json").read_text())["machines"]
+    assert command_line.run(cli.app, [*command, "--workers", "0"]) == 2
+    assert "workers: expected a whole number from 1" in capsys.readouterr().err

@@ -1,0 +1,189 @@
+"""Intervals, paired tests and ranks: against SciPy, by hand, and by simulation with planted faults."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pcii.base.errors import InputError
+from pcii.evaluation.rows import frame_of
+from pcii.evaluation.summary import (
+    MAX_EXACT_PAIRS,
+    RANDOM_FLIPS,
+    Kind,
+    mean_interval,
+    means,
+    ranks,
+    sign_flip_p,
+)
+
+
+@pytest.mark.parametrize("n", [2, 3, 20])
+def test_the_interval_is_students(n: int) -> None:
+    x = np.random.default_rng(n).normal(0.7, 0.1, n)
+    known = stats.ttest_1samp(x, 0).confidence_interval(0.95)
+    found = mean_interval(x.tolist())
+    assert (found.n, found.mean) == (n, pytest.approx(x.mean()))
+    assert (found.low, found.high) == (pytest.approx(known.low), pytest.approx(known.high))
+
+
+def test_intervals_by_hand() -> None:
+    # t(0.975, 2) = 4.302653; the standard deviation is 0.2: 4.302653 * 0.2 / sqrt(3) = 0.496828
+    share = mean_interval([0.6, 0.8, 1.0], "share")
+    assert share == pytest.approx((3, 0.8, 0.303172, 1.0), abs=1e-6)  # 1.297 is no share
+    # Mean 2, deviation 1: 4.302653 / (2 sqrt(3)) = 1.242069, whose exponential is 3.462770.
+    positive = mean_interval([1.0, 2.0, 3.0], "positive")
+    assert positive == pytest.approx((3, 2.0, 2 / 3.462770, 2 * 3.462770), abs=1e-5)
+    # Logarithms 0 and 2: mean 1, half 12.7062 * sqrt(2) / sqrt(2).
+    geometric = mean_interval([1.0, np.exp(2.0)], "geometric")
+    assert geometric == pytest.approx((2, np.e, np.exp(1 - 12.7062), np.exp(1 + 12.7062)), rel=1e-4)
+    # One of five took a hundred times as long: Student's interval of the mean itself is from -32 to 74.
+    assert 0 < mean_interval([1.0, 1.0, 1.0, 1.0, 100.0], "positive").low < 20.8
+    assert mean_interval([1.0, 1.0, 1.0, 1.0, 100.0]).low < -30
+
+
+@pytest.mark.parametrize("kind", ["signed", "share", "positive"])
+def test_one_value_has_no_interval_and_equal_ones_one_without_width(kind: Kind) -> None:
+    one = mean_interval([0.4], kind)
+    assert (one.n, one.mean) == (1, 0.4)
+    assert np.isnan([one.low, one.high]).all()
+    for value in (0.0, 0.5):
+        assert mean_interval([value] * 3, kind) == (3, value, value, value)
+
+
+@pytest.mark.parametrize("values", [[], [0.5, float("nan")], [float("inf")]])
+def test_what_has_no_mean_is_refused(values: list[float]) -> None:
+    with pytest.raises(InputError, match="at least one finite number"):
+        mean_interval(values)
+    with pytest.raises(InputError, match="at least 0"):
+        mean_interval([1.0, -1.0], "positive")
+
+
+TRIALS = 4000
+# Share of trials that a 95 % interval covers: standard deviation sqrt(0.95 * 0.05 / 4000) = 0.0034.
+TOLERANCE = 4 * 0.0034
+
+
+def test_the_interval_covers_the_truth_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    covered, by_normal = 0, 0
+    for x in rng.normal(0.5, 0.1, (TRIALS, 5)):
+        found = mean_interval(x.tolist())
+        covered += found.low <= 0.5 <= found.high
+        by_normal += abs(x.mean() - 0.5) <= 1.96 * x.std(ddof=1) / np.sqrt(5)
+    assert abs(covered / TRIALS - 0.95) < TOLERANCE
+    # The planted fault: the normal distribution's 1.96 instead of Student's 2.78 covers 88 %.
+    assert abs(by_normal / TRIALS - 0.95) > TOLERANCE
+
+
+def test_the_interval_of_times_covers_skewed_ones_better_than_students() -> None:
+    rng = np.random.default_rng(8)
+    covered, by_student = 0, 0
+    for x in rng.exponential(1.0, (TRIALS, 5)):
+        found, student = mean_interval(x.tolist(), "positive"), mean_interval(x.tolist())
+        covered += found.low <= 1.0 <= found.high
+        by_student += student.low <= 1.0 <= student.high
+    # 0.93 and 0.88 of 20 000 trials of the same kind.
+    assert abs(covered / TRIALS - 0.93) < TOLERANCE
+    assert covered - by_student > TOLERANCE * TRIALS
+
+
+@pytest.mark.parametrize(
+    ("differences", "p"),
+    [
+        ([1, 2, 3], 2 / 8),  # only all signs kept or all flipped are as far as 6
+        ([1, 2, -3], 1.0),  # the sum is 0, and nothing is nearer
+        ([4, 2, -1], 4 / 8),  # as far as 5: 4+2+1, 4+2-1 and their opposites
+        ([0.1, 0.1, 0.1], 2 / 8),
+        ([0, 0, 0, 0], 1.0),
+        ([5], 1.0),
+    ],
+)
+def test_few_signs_are_flipped_by_hand(differences: list[float], p: float) -> None:
+    found, least_p = sign_flip_p(np.array(differences, dtype=float))
+    assert found == pytest.approx(p)
+    assert least_p == 2 / 2 ** len(differences)
+
+
+def test_many_signs_are_drawn_and_agree_with_all_of_them() -> None:
+    x = np.random.default_rng(5).normal(0.05, 0.14, MAX_EXACT_PAIRS + 1)
+    signs = 1 - 2.0 * ((np.arange(1 << x.size)[:, None] >> np.arange(x.size)) & 1)
+    exact = np.mean(np.abs(signs @ x) >= abs(x.sum()) * (1 - 1e-12))
+    found, _ = sign_flip_p(x)
+    # Twice the smaller tail: four standard deviations of that share.
+    assert abs(found - exact) < 8 * np.sqrt(exact / 2 * (1 - exact / 2) / RANDOM_FLIPS)
+    assert sign_flip_p(x)[0] == found
+    assert sign_flip_p(x + 1) == (pytest.approx(2 / (1 + RANDOM_FLIPS)), 2 / (1 + RANDOM_FLIPS))
+
+
+def test_chance_is_seldom_called_a_difference() -> None:
+    rng = np.random.default_rng(6)
+    # p comes in steps of 2 / 256, of which 0.05 is none: at most 12 / 256 are below. 4 deviations of it.
+    share = 12 / 256
+    found, _ = sign_flip_p(rng.normal(0, 1, (2000, 8)))
+    assert abs(np.mean(found <= 0.05) - share) < 4 * np.sqrt(share / 2000)
+    # The planted fault: a difference of one standard deviation is found far more often.
+    assert np.mean(sign_flip_p(rng.normal(1, 1, (2000, 8)))[0] <= 0.05) > 0.5
+
+
+A, B = "depth:a", "depth:b"
+
+
+def row(scene: str, seed: int, method: str, bad_1px: float, **depth: Any) -> dict[str, Any]:
+    head = {"dataset": f"seed_{seed}", "identity": f"{scene} {seed}", "seed": seed, "seconds": 1.0}
+    head |= {"recipe": scene, "title": scene, "budget": 30.0, "photons_per_view": 30.0}
+    return head | {"method": method, "depth": {"bad_1px": bad_1px, **depth}}
+
+
+BY_HAND = [
+    row("cards", 1, A, 0.25),
+    row("cards", 2, A, 0.75),
+    row("cards", 1, B, 0.5),
+    row("cards", 2, B, 1.0),
+    row("slats", 1, A, 0.25),
+    row("slats", 1, B, 0.75),
+    row("slats", 2, B, 0.0),  # datasets that the other method has not seen
+    row("slats", 3, A, 1.0),
+    row("alone", 1, B, 0.0),  # and a scene
+]
+
+
+def test_each_scene_counts_once_with_the_seeds_that_all_methods_have() -> None:
+    first, second = ranks(frame_of(BY_HAND), "bad_1px").to_dict("records")
+    # a: 0.5 and 0.25; b: 0.75 twice, so it is worse by 0.25 and 0.5, with 12.706 * 0.125 to either side.
+    assert (first["light"], first["method"], first["rank"], first["n"], first["mean"]) == (30, A, 1, 2, 0.375)
+    assert np.isnan([first["difference"], first["p"]]).all()
+    assert (second["method"], second["rank"], second["mean"]) == (B, 2, 0.75)
+    assert (second["low"], second["high"]) == (0.75, 0.75)
+    ends = [second[name] for name in ("difference", "difference_low", "difference_high")]
+    assert ends == pytest.approx([0.375, 0.375 - 1.588, 0.375 + 1.588], abs=1e-3)
+    assert second["p"] == second["least_p"] == 0.5
+
+
+def test_one_method_over_many_scenes_has_one_mean_and_equal_methods_share_a_rank() -> None:
+    (alone,) = ranks(frame_of([row(str(n), 1, A, n / 4) for n in range(4)]), "bad_1px").to_dict("records")
+    # Deviation 0.3227: 3.18245 * 0.3227 / 2 = 0.5136, and no share is below 0.
+    found = [alone[name] for name in ("n", "mean", "low", "high")]
+    assert found == pytest.approx([4, 0.375, 0, 0.8886], abs=1e-4)
+    equal = frame_of([row(scene, 1, method, 0.5) for scene in ("cards", "slats") for method in (A, B)])
+    assert ranks(equal, "bad_1px")["rank"].tolist() == [1, 1]
+    assert not len(ranks(frame_of(BY_HAND[:4]), "bad_1px"))  # one scene has no spread over scenes
+    assert ranks(frame_of(BY_HAND[:4]), "bad_1px", "identity")["mean"].tolist() == [0.5, 0.75]
+
+
+def test_means_are_over_the_seeds_that_have_a_value() -> None:
+    def bins(share: float, confidence: float | None, correct: float | None) -> dict[str, Any]:
+        return {"0.9-1.0": {"share": share, "confidence": confidence, "correct": correct}}
+
+    rows = [
+        row("t", 1, A, 0.5, ece=0.25, reliability=bins(1.0, 0.96, 0.5)),
+        row("t", 2, A, 0.5, ece=0.75, reliability=bins(0.5, 0.92, 0.25)),
+        row("t", 3, A, 0.5, ece=None, reliability=None),
+        row("t", 4, A, 0.5, ece=0.5, reliability=bins(0.0, None, None)),
+    ]
+    table = means(frame_of(rows)).set_index("measure")
+    expected = {"ece": (3, 0.5), "bad_1px": (4, 0.5)}
+    expected |= {"reliability.0.9-1.0.share": (3, 0.5), "reliability.0.9-1.0.confidence": (2, 0.94)}
+    for measure, (n, mean) in expected.items():
+        assert (table.at[measure, "n"], table.at[measure, "mean"]) == (n, pytest.approx(mean))
