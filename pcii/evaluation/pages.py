@@ -158,6 +158,8 @@ def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> s
     `table` has means by method, light and measure. Empty if no method has the measure.
     """
     cells = table[table["measure"] == measure].set_index(["method", "light"])
+    if cells.empty:
+        return ""
     cells = cells[["mean", "low", "high"]]
     cells = cells.assign(**{end: cells[end].fillna(cells["mean"]) for end in ("low", "high")})
     for name in ("photons_per_view", "seconds"):

@@ -272,7 +272,7 @@ def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
             r"methods: expected names, functions, or pairs \(name, function\), got \('mine', 3\)",
         ),
         (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:focus"),
-        (["no_such_file.py:mine"], "method: 'no_such_file.py:mine' cannot be loaded: FileNotFoundError"),
+        (["no_such_file.py:mine"], "method: 'no_such_file.py:mine' cannot be loaded: ModuleNotFoundError"),
         (["json:nothing"], "method: 'json:nothing' cannot be loaded: AttributeError"),
     ],
 )

@@ -26,6 +26,7 @@ from pcii.evaluation.provenance import origin_of
 from pcii.evaluation.rows import frame_of
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import FULL_LIGHT, open_dataset
+from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
@@ -84,7 +85,7 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     with pytest.MonkeyPatch.context() as patch:
         for name in NAMES:
             patch.setitem(METHODS, name, named(name))
-        return analyse(dataset, None, methods=NAMES)
+        return analyse(dataset, planes_of(dataset, None), depth_range_of(dataset), NAMES)
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +97,8 @@ def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     (out / "rows.jsonl").touch()
     with pytest.MonkeyPatch.context() as patch:
         # A plot takes half a second.
-        patch.setattr(pages_module, "accuracy_plots", lambda *_: PICTURE)
-        patch.setattr(pages_module, "calibration_plots", lambda *_: PICTURE)
+        patch.setattr(pages_module, "accuracy_plot", lambda *_: PICTURE)
+        patch.setattr(pages_module, "_calibration_plot", lambda *_: PICTURE)
         patch.setattr(pages_module, "MAX_DETAILED_SCENES", 2 * len(NAMES))
         write_evaluation(out, frame_of(rows), origin_of(rows))
     files = ("report.html", "evaluation.html", "evaluation.md")
