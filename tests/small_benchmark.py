@@ -24,9 +24,6 @@ DEFINITION: dict[str, Any] = {
     ],
 }
 
-REFERENCE_SCORES = {"pair": {"mean": 0.5, "interval": [0.4, 0.6]}}
-"""What its certificate says of the simple method, whose scores would take their time in every test."""
-
 
 def written(folder: Path, **changes: Any) -> tuple[Definition, Path]:
     file = folder / "benchmarks" / "small.toml"

@@ -1,11 +1,11 @@
 """The public benchmark: its definition, the datasets that follow from it, and their certificate.
 
 A benchmark is one TOML file. What it holds never changes under one name: other scenes, cameras or light make
-another benchmark. Whoever makes it gets the bytes that were published on the same kind of machine. Others (of
-another vector width, say) round otherwise, so that some light paths end elsewhere and the photons are other
-draws of the same light. Then photons are compared in tiles of the film: with a and b photons in a tile the
-sum of (a - b)^2 / (a + b) has a chi-square distribution, with as many degrees of freedom as there are tiles
-with photons.
+another benchmark. On the same kind of machine it has the bytes that were published. Others (of another vector
+width, say) round otherwise, so that some light paths end elsewhere and the photons are other draws of the same
+light. Then photons are compared in tiles of the film: with a and b photons in a tile the sum of
+(a - b)^2 / (a + b) has a chi-square distribution, with as many degrees of freedom as there are tiles with
+photons. Radiance in other bytes is not compared.
 """
 
 import json
@@ -27,20 +27,12 @@ Light = Literal["photons", "frames", "full-light"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
 Photons = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 CERTIFICATE = "certificate.json"
-REFERENCE_METHOD = "brightness"
-"""In focus is what is bright: the simplest method of removal."""
 TILE_PX = 64
 MIN_P = 1e-4
-"""Benchmarks that are draws of the same light are taken for others this rarely, over all their datasets."""
-LIGHT_TOLERANCE = 0.01
-"""Of the light of a view, whose rendering noise is a tenth of it."""
-IOU_TOLERANCE = 0.02
-"""Means that are closer say nothing: the interval of three draws may be narrow by chance."""
+"""The share of benchmarks, drawn of the same light, that are taken for other ones; over all their datasets."""
 
 Content = Mapping[str, Any]
-"""Of a dataset: a hash of its files, and what its photons or its radiance are in brief."""
-Scores = Mapping[str, Mapping[str, Any]]
-"""By scene: `mean` IoU over seeds and its 95 % `interval`."""
+"""Of a dataset: a hash of its files, and its photons in each view and each tile."""
 
 
 class _Model(BaseModel):
@@ -146,8 +138,8 @@ class Verdict:
         if self.same_bytes == self.compared:
             return f"all {self.compared} datasets have the bytes that were published"
         return (
-            f"{self.same_bytes} of {self.compared} datasets have the bytes that were published; the others, "
-            f"of another kind of machine, are draws of the same light (p = {self.least_p:.2g})"
+            f"{self.same_bytes} of {self.compared} datasets have the bytes that were published; photons of the "
+            f"others, of another kind of machine, are draws of the same light (p = {self.least_p:.2g})"
         )
 
 
@@ -169,49 +161,23 @@ def content_of(dataset: Dataset) -> Content:
         tile_count = -(-grid.height // TILE_PX) * across
         content["views"] = np.bincount(views, events.n, grid.view_count).astype(np.int64).tolist()
         content["tiles"] = np.bincount(tiles, events.n, tile_count).astype(np.int64).tolist()
-    if dataset.views is not None:
-        cameras = np.ndindex(dataset.grid.rows, dataset.grid.cols)
-        means = (dataset.views.view(k, l).mean(dtype=np.float64) for k, l in cameras)
-        content["light"] = [float(f"{mean:.6g}") for mean in means]
     return content
 
 
 def compare(own: Mapping[str, Content], published: Mapping[str, Content]) -> Verdict:
-    """Compare datasets by name with the published ones; those that are not there are not compared."""
+    """Compare datasets by name with the published ones: their bytes, and photons where those differ."""
     problems = [f"{name}: is not in the published benchmark" for name in own if name not in published]
-    others = {
-        name: (content, published[name])
-        for name, content in own.items()
-        if name in published and content["sha256"] != published[name]["sha256"]
-    }
-    tests = {
-        name: _photons_p(ours, theirs)
-        for name, (ours, theirs) in others.items()
-        if "tiles" in ours and "tiles" in theirs
-    }
-    for name, p in tests.items():
-        if p * len(tests) < MIN_P:
-            problems.append(f"{name}: its photons lie elsewhere than the published ones (p = {p:.2g})")
-    for name, (ours, theirs) in others.items():
-        if name not in tests:
-            lights = [np.array(content.get("light", [])) for content in (ours, theirs)]
-            if lights[0].shape != lights[1].shape or not np.allclose(*lights, rtol=LIGHT_TOLERANCE):
-                problems.append(f"{name}: its views have other light than the published ones")
-    least_p = min([1.0, *(p * len(tests) for p in tests.values())])
-    same_bytes = len(own.keys() & published.keys()) - len(others)
-    return Verdict(len(own), same_bytes, least_p, tuple(problems))
-
-
-def differing_scores(own: Scores, published: Scores) -> list[str]:
-    """A sentence for each scene whose interval has nothing in common with the published one."""
-    problems = []
-    for scene in sorted(own.keys() & published.keys()):
-        (low, high), (least, most) = (scores[scene]["interval"] for scores in (own, published))
-        apart = abs(own[scene]["mean"] - published[scene]["mean"])
-        if (high < least or most < low) and apart > IOU_TOLERANCE:
-            means = f"{own[scene]['mean']:.3f} instead of {published[scene]['mean']:.3f}"
-            problems.append(f"{scene}: the method {REFERENCE_METHOD!r} has an IoU of {means} there")
-    return problems
+    pairs = {name: (content, published[name]) for name, content in own.items() if name in published}
+    others = {name: pair for name, pair in pairs.items() if pair[0]["sha256"] != pair[1]["sha256"]}
+    tests = {name: _photons_p(*pair) for name, pair in others.items() if "tiles" in pair[0]}
+    corrected = {name: min(1.0, p * len(tests)) for name, p in tests.items()}
+    problems += [
+        f"{name}: its photons lie elsewhere than the published ones (p = {p:.2g})"
+        for name, p in corrected.items()
+        if p < MIN_P
+    ]
+    least_p = min(corrected.values(), default=1.0)
+    return Verdict(len(own), len(pairs) - len(others), least_p, tuple(problems))
 
 
 def _photons_p(ours: Content, theirs: Content) -> float:
@@ -220,7 +186,7 @@ def _photons_p(ours: Content, theirs: Content) -> float:
 
     smallest = 1.0
     for name in ("tiles", "views"):
-        a, b = (np.array(content[name], np.float64) for content in (ours, theirs))
+        a, b = (np.array(content.get(name, []), np.float64) for content in (ours, theirs))
         if a.shape != b.shape:
             return 0.0
         total = a + b

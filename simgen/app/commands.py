@@ -148,8 +148,7 @@ def make(
     """Make the datasets of a benchmark, and compare them with the published ones; run again to resume.
 
     OUT is a collection with a folder for each dataset, and certificate.json, which says whether they have the
-    published bytes or, on another kind of machine, are draws of the same light, on which a simple method has
-    the published scores.
+    published bytes or, on another kind of machine, photons that are draws of the same light.
 
     Examples of use:
 

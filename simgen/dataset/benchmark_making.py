@@ -1,11 +1,7 @@
 """Making the public benchmark: all of its datasets as one collection, and their certificate."""
 
-import csv
-import subprocess
-import sys
-import tempfile
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +11,11 @@ from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.store.benchmark_layout import (
     CERTIFICATE,
-    REFERENCE_METHOD,
     Content,
     Definition,
-    Scores,
     Verdict,
     compare,
     content_of,
-    differing_scores,
     published_certificate,
 )
 from pcii.store.collection import BENCHMARK_FIELDS, IN_FRAMES, Half, open_collection
@@ -33,9 +26,6 @@ from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions
 from simgen.renderer import backend
 from simgen.spec.recipe import Recipe, load_recipe
-
-REFERENCE_PHOTONS_PER_VIEW = 1000.0
-"""Light in which the reference method is scored."""
 
 
 def benchmark_files() -> dict[str, Path]:
@@ -129,22 +119,13 @@ def make_benchmark(
 
 
 def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
-    """Compare all datasets in `out` with the published ones, and write the certificate there.
-
-    Only where their bytes differ, or where nothing is published, a simple method is scored on them too.
-    """
+    """Compare all datasets in `out` with the published ones, and write the certificate there."""
     own: dict[str, Content] = {}
     collection = open_collection(out)
     for row, dataset in zip(collection.rows, collection, strict=True):
         own[row["path"]] = content_of(dataset)
         report("certificate", len(own), len(collection))
-    published = published_certificate(file)
-    verdict = compare(own, published.get("datasets", {}))
-    scores: Scores = {}
-    if verdict.same_bytes < verdict.compared:
-        scores = reference_scores(out, dict.fromkeys(row["values"]["half"] for row in collection.rows))
-        problems = differing_scores(scores, published.get("reference_scores", {}))
-        verdict = replace(verdict, problems=(*verdict.problems, *problems))
+    verdict = compare(own, published_certificate(file).get("datasets", {}))
     document = {
         "benchmark": definition.name,
         "definition_sha256": hash_json(definition.model_dump(mode="json")),
@@ -152,30 +133,7 @@ def certify(definition: Definition, file: Path, out: Path, report: Report = sile
         "backend": backend.describe(),
         "versions": versions(),
         **asdict(verdict),
-        "reference_scores": scores,
         "datasets": own,
     }
     write_json_safely(out / CERTIFICATE, document)
     return verdict
-
-
-def reference_scores(benchmark: Path, halves: Iterable[Half]) -> dict[str, Mapping[str, Any]]:
-    """IoU of the reference method on each scene of these halves; `InputError` if `pcii benchmark run` fails.
-
-    That runs in a process of its own, since nothing here may import it.
-    """
-    scores: dict[str, Mapping[str, Any]] = {}
-    for half in halves:
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "scores"
-            words = ["benchmark", "run", REFERENCE_METHOD, "--budget", f"{REFERENCE_PHOTONS_PER_VIEW:g}"]
-            words += ["--half", half, "--data", str(benchmark), "-o", str(out)]
-            program = "import sys; from pcii.app.commands import main; sys.exit(main())"
-            if subprocess.run([sys.executable, "-c", program, *words], stdout=subprocess.DEVNULL).returncode:
-                raise InputError(f"certificate: `pcii {' '.join(words)}` failed, as said above")
-            with (out / "means.csv").open(encoding="utf-8", newline="") as file:
-                for row in csv.DictReader(file):
-                    if row["measure"] == "iou" and row["low"]:
-                        interval = [float(row["low"]), float(row["high"])]
-                        scores[row["scene"]] = {"mean": float(row["mean"]), "interval": interval}
-    return scores
