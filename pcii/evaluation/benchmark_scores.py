@@ -72,7 +72,7 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     except ValidationError:
         raise fault from None
     collection = open_collection(path)
-    chosen: Collection = collection.where(lambda row: row["values"]["half"] == half)
+    chosen: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
     if not len(chosen):
         raise InputError(f"{path}: has no dataset of the {half} half; `simgen benchmark make` makes it")
     datasets = list(chosen)

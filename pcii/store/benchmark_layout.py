@@ -1,9 +1,9 @@
 """The public benchmark: its definition, the datasets that follow from it, and their certificate.
 
 A benchmark is one TOML file. What it holds never changes under one name: other scenes, cameras or light make
-another benchmark. On the same kind of machine it has the bytes that were published. Others (of another vector
-width, say) round otherwise, so that some light paths end elsewhere and the photons are other draws of the same
-light. Then photons are compared in tiles of the film: with a and b photons in a tile the sum of
+another benchmark. On the same kind of machine it has the bytes that were published. Others (of another
+vector width, say) round otherwise, so that some light paths end elsewhere and the photons are other draws of
+the same light. Then photons are compared in tiles of the film: with a and b photons in a tile the sum of
 (a - b)^2 / (a + b) has a chi-square distribution, with as many degrees of freedom as there are tiles with
 photons. Radiance in other bytes is not compared.
 """
@@ -29,7 +29,7 @@ Photons = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 CERTIFICATE = "certificate.json"
 TILE_PX = 64
 MIN_P = 1e-4
-"""The share of benchmarks, drawn of the same light, that are taken for other ones; over all their datasets."""
+"""The share of benchmarks of the same light that are taken for other ones, by any of their datasets."""
 
 Content = Mapping[str, Any]
 """Of a dataset: a hash of its files, and its photons in each view and each tile."""
@@ -138,8 +138,8 @@ class Verdict:
         if self.same_bytes == self.compared:
             return f"all {self.compared} datasets have the bytes that were published"
         return (
-            f"{self.same_bytes} of {self.compared} datasets have the bytes that were published; photons of the "
-            f"others, of another kind of machine, are draws of the same light (p = {self.least_p:.2g})"
+            f"{self.same_bytes} of {self.compared} datasets have the bytes that were published; photons of "
+            f"the others, of another kind of machine, are draws of the same light (p = {self.least_p:.2g})"
         )
 
 

@@ -18,14 +18,13 @@ from pcii.store.dataset_layout import (
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
-    REMEDY,
     TRUTH,
     nested_name,
     radiance_name,
     read_exr,
     read_manifest,
 )
-from pcii.store.folders import check_file, check_files, check_free, lists_part
+from pcii.store.folders import check_file, check_free, lists_part
 from pcii.store.zarr_groups import read_array
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.types.camera_grid import CameraGrid
@@ -255,7 +254,7 @@ class Dataset(ShortForm):
         name = radiance_name(k, l)
         if name not in self.manifest.files:
             raise InputError(f"{self.path}: the manifest lists no {name}")
-        check_file(self.path, name, self.manifest.files[name], REMEDY, content=True)
+        check_file(self.path, name, self.manifest.files[name])
         return self.path / name
 
     def _arrays(
@@ -264,10 +263,7 @@ class Dataset(ShortForm):
         K, L, H, W = self.grid.shape_KLHW
         sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
         files = self.manifest.files
-        return {
-            name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
-            for name in names
-        }
+        return {name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes) for name in names}
 
 
 def open_dataset(path: str | Path) -> Dataset:
@@ -282,7 +278,8 @@ def open_dataset(path: str | Path) -> Dataset:
     """
     root = Path(path)
     manifest = read_manifest(root)
-    check_files(root, manifest.files, REMEDY, content=False)
+    for name, entry in manifest.files.items():
+        check_file(root, name, entry, content=False)
     return Dataset(root, manifest)
 
 
