@@ -167,8 +167,7 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from pcii.store.benchmark_layout import CERTIFICATE
-    from simgen.dataset.benchmark_making import certify, load_definition, make_benchmark
+    from simgen.dataset.benchmark_making import CERTIFICATE, certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)

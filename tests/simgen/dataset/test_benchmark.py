@@ -11,21 +11,19 @@ from small_benchmark import SCENE, written
 import pcii
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.store.benchmark_layout import (
-    CERTIFICATE,
-    Definition,
-    compare,
-    published_certificate,
-)
 from pcii.store.folders import hash_json
 from pcii.store.verification import verify
 from simgen.app.commands import app
 from simgen.dataset.benchmark_making import (
+    CERTIFICATE,
     BenchmarkSeries,
+    Definition,
     benchmark_files,
     certify,
+    compare,
     load_definition,
     make_benchmark,
+    published_certificate,
 )
 
 pytestmark = pytest.mark.renders
@@ -84,7 +82,7 @@ def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Def
     [
         ({"seeds": []}, "seeds: expected at least one, each once"),
         ({"photons_per_view": [300, 30]}, "photons_per_view: expected growing numbers"),
-        ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "'a' is there twice"),
+        ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "scene: expected a name of its own"),
         ({"scene": [SCENE | {"name": "A B"}]}, r"scene\[0\]\.name"),
     ],
 )
