@@ -45,7 +45,8 @@ def main(folder: Path) -> None:
     collection = simgen.generate_collection("small", folder, overrides, scenes=4)
     print(collection)
     weight, bias = 0.0, 0.0
-    for step, (counts, focus) in enumerate(batches(collection.where(split="train"), size=2, seed=0)):
+    training = collection[collection.table()["split"] == "train"]
+    for step, (counts, focus) in enumerate(batches(training, size=2, seed=0)):
         n, _, height, width = counts.shape
         cells = counts.sum(axis=1).reshape(n, height // 8, 8, width // 8, 8).sum(axis=(2, 4))
         wanted = focus.reshape(n, height // 8, 8, width // 8, 8).mean(axis=(2, 4))

@@ -48,16 +48,13 @@ def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """That of `small_benchmark`: two scenes of 2 x 2 views, with the certificate that publishes it."""
-    from small_benchmark import REFERENCE_SCORES, written
+    from small_benchmark import written
 
-    from pcii.store.benchmark_layout import CERTIFICATE
-    from simgen.dataset.benchmark_making import certify, make_benchmark
+    from simgen.dataset.benchmark_making import CERTIFICATE, certify, make_benchmark
 
     folder = tmp_path_factory.mktemp("benchmark")
     definition, file = written(folder)
     assert make_benchmark(definition, file, folder / "made") == []
-    with pytest.MonkeyPatch.context() as without:
-        without.setattr("simgen.dataset.benchmark_making.reference_scores", lambda *_: REFERENCE_SCORES)
-        assert certify(definition, file, folder / "made").problems  # nothing is published yet
+    assert certify(definition, file, folder / "made").problems  # nothing is published yet
     (folder / "made" / CERTIFICATE).rename(file.with_suffix(f".{CERTIFICATE}"))
     return folder / "made"

@@ -5,8 +5,7 @@ from typing import Any
 
 import tomli_w
 
-from pcii.store.benchmark_layout import Definition
-from simgen.dataset.benchmark_making import load_definition
+from simgen.dataset.benchmark_making import Definition, load_definition
 
 SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
 SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
@@ -23,9 +22,6 @@ DEFINITION: dict[str, Any] = {
         SCENE | {"name": "wall", "kind": "nothing", "half": "test", "recipe": "blank"},
     ],
 }
-
-REFERENCE_SCORES = {"pair": {"mean": 0.5, "interval": [0.4, 0.6]}}
-"""What its certificate says of the simple method, whose scores would take their time in every test."""
 
 
 def written(folder: Path, **changes: Any) -> tuple[Definition, Path]:

@@ -47,7 +47,7 @@ from pcii.store.folders import (
     unlisted_files,
 )
 from pcii.store.software import differences, own_software
-from pcii.store.zarr_groups import read_array, write_arrays
+from pcii.store.zarr_groups import read_array, write_arrays_safely
 from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS
 from pcii.types.estimates import DepthMap, Score, Segmented
 from pcii.types.focal_planes import FocalPlanes
@@ -122,14 +122,11 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
 
 @contextmanager
 def _only_writer(lock: Path, out: Path) -> Iterator[None]:
-    try:
-        with locked(lock, wait=False):
-            try:
-                yield
-            finally:
-                lock.unlink(missing_ok=True)
-    except BlockingIOError:
-        raise InputError(f"{out}: another command is writing results there; wait for its end") from None
+    with locked(lock, out):
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
 
 
 def _origin(dataset: Dataset) -> dict[str, Any]:
@@ -166,7 +163,7 @@ def save_sections(folder: Path, sections: Sections) -> None:
     labels = SECTIONS_LABELS
     if sections.counts.dtype.kind == "f":
         labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
-    write_arrays(folder / SECTIONS, arrays, labels, pattern)
+    write_arrays_safely(folder / SECTIONS, arrays, labels, pattern)
 
 
 def save_segmented(folder: Path, focus: Segmented) -> None:
@@ -177,12 +174,13 @@ def save_segmented(folder: Path, focus: Segmented) -> None:
     path = folder / f"segmented_{focus.method}.zarr"
     if path.parent != folder or path.exists():
         raise InputError(f"method: {focus.method!r} is no file name, or the name of two methods")
-    write_arrays(path, arrays, SEGMENTED_LABELS, {"method": focus.method})
+    write_arrays_safely(path, arrays, SEGMENTED_LABELS, {"method": focus.method})
 
 
 def save_depth(folder: Path, depth: DepthMap) -> None:
     """Write the depth map and its confidence."""
-    write_arrays(folder / DEPTH, {"z_mm": depth.z_mm, "confidence": depth.confidence}, DEPTH_LABELS)
+    arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
+    write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS)
 
 
 def save_score(folder: Path, result: Score) -> None:
@@ -201,9 +199,7 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
 
     def read(part: str, labels: Mapping[str, Any]) -> dict[str, np.ndarray]:
         names = [name for name in labels if lists_part(files, f"{part}/{name}")]
-        return {
-            n: read_array(out, f"{part}/{n}", files, labels[n], sizes, RESULTS_FOLDER.remedy) for n in names
-        }
+        return {n: read_array(out, f"{part}/{n}", files, labels[n], sizes) for n in names}
 
     segmented: list[Segmented] = []
     sections: dict[bytes, Sections] = {}

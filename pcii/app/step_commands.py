@@ -64,7 +64,7 @@ def run(
     """
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
-    z_range_mm = z_range_mm or depth_range_of(data, planes)
+    z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
     for row in outcome.score.planes:

@@ -138,11 +138,11 @@ def named_in_errors(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
+def locked(path: Path, folder: Path) -> Iterator[IO[bytes]]:
     """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
-    The holder of the lock may delete the file, and its folder. Raises BlockingIOError if another process
-    holds it and `wait` is false.
+    The holder of the lock may delete the file, and its folder. Raises `InputError`, of the folder that is
+    written to, if another process holds it.
     """
     import fcntl  # not available on every system, and needed by writers only
 
@@ -153,7 +153,10 @@ def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
             path.parent.mkdir(parents=True, exist_ok=True)
             continue
         with opened as file:
-            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(f"{folder}: another run writes here; wait for its end") from None
             if _is_file_at(path, file):  # else the last holder has deleted it meanwhile
                 file.seek(0)
                 yield file

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
@@ -31,8 +30,14 @@ from pcii.figures.pictures import depth_image, photo_bytes
 from pcii.figures.plots import depth_limits_mm
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.benchmark_layout import Definition
-from pcii.store.collection import Collection, Half, is_collection, open_collection, read_collection
+from pcii.store.collection import (
+    BENCHMARK_FIELDS,
+    Collection,
+    Half,
+    is_collection,
+    open_collection,
+    read_collection,
+)
 from pcii.store.dataset import FULL_LIGHT, Dataset, budget_of
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented
@@ -67,12 +72,11 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     fault = InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     if not is_collection(path):
         raise fault
-    try:
-        definition = Definition.model_validate(read_collection(path).get("recipe"))
-    except ValidationError:
-        raise fault from None
+    about = read_collection(path)
+    if about.fields != [*BENCHMARK_FIELDS]:
+        raise fault
     collection = open_collection(path)
-    chosen: Collection = collection.where(lambda row: row["values"]["half"] == half)
+    chosen: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
     if not len(chosen):
         raise InputError(f"{path}: has no dataset of the {half} half; `simgen benchmark make` makes it")
     datasets = list(chosen)
@@ -84,7 +88,7 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
         if lights[name] == "photons" and scene not in first_draws.values():
             first_draws[name] = scene
     full_light = {name: lit[scene] for name, scene in scenes.items() if scene in lit}
-    return BenchmarkHalf(definition.name, half, datasets, full_light, first_draws)
+    return BenchmarkHalf(about.recipe["name"], half, datasets, full_light, first_draws)
 
 
 class BenchmarkJob(EvaluationJob):

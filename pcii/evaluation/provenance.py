@@ -9,7 +9,6 @@ import platform
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +16,18 @@ from pcii.depth import methods as depth
 from pcii.evaluation.method_names import NamedMethod, estimator_of
 from pcii.removal import methods as removal
 from pcii.store.folders import hash_bytes
-from pcii.store.software import PACKAGE, hash_of_source, own_software, software_of_entry_point
+from pcii.store.software import PACKAGE, own_software, software_with
 
 
 def software_of(method: str) -> dict[str, str]:
     """All software that the result of a method, by its full name, follows from: versions, hashes of sources.
 
-    For a method of another package these are also that package's version, source and requirements. The source
-    is every file of a package, so also the weights of a network.
+    For a method of another package this is also the source of that package: every file of it, so also the
+    weights of a network.
     """
     estimator = estimator_of(method)
     point = removal.REGISTRY.point_of(method) if estimator is None else depth.REGISTRY.point_of(estimator)
-    return own_software() | ({} if point is None else software_of_entry_point(point))
+    return own_software() if point is None else software_with(point.module)
 
 
 def software_of_method(method: NamedMethod) -> dict[str, str] | None:
@@ -37,15 +36,7 @@ def software_of_method(method: NamedMethod) -> dict[str, str] | None:
         return software_of(method.name)
     if not method.source:
         return None
-    place = (estimator_of(method.source) or method.source).rpartition(":")[0]
-    if place.endswith(".py"):
-        file = Path(place)
-    else:
-        spec = find_spec(place)
-        assert spec is not None
-        assert spec.origin is not None
-        file = Path(spec.origin)
-    return own_software() | {f"source of {place}": hash_of_source([file])}
+    return software_with((estimator_of(method.source) or method.source).rpartition(":")[0])
 
 
 def origin_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -61,7 +61,7 @@ def write_card(root: Path, terms: Terms) -> None:
         is_written = present == content and not temporaries_of(root, CARD)
         if is_written or INSTALL.encode() not in present:
             return
-    with locked(root / (COLLECTION if is_collection(root) else MANIFEST), wait=True):
+    with locked(root / (COLLECTION if is_collection(root) else MANIFEST), root):
         for temporary in temporaries_of(root, CARD):
             temporary.unlink()
         write_bytes_safely(file, content)

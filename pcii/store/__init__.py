@@ -1,7 +1,5 @@
 """What is on disk: datasets, collections and results, written whole, listed with their hashes, and verified.
 
-benchmark_layout  The public benchmark: its definition, the datasets that follow from it, and their
-                  certificate.
 collection        Collections of datasets, opened one by one as they are used.
 dataset           Datasets: counts, truth and radiance of a dataset folder, each checked when it is read.
 dataset_layout    The dataset folder on disk: its files, their arrays and its manifest.

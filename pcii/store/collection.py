@@ -10,7 +10,7 @@ all the manifests, and the hash of each.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -31,19 +31,8 @@ COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 """Columns of the table beside the swept fields."""
 COLLECTION = "collection.json"
 INDEX = "index.jsonl"
-LOCK = ".lock"
-"""Locked while a run writes to the folder, and then removed."""
+COLLECTION_FOLDER = FolderKind("collection", COLLECTION, 1, "simgen generate", frozenset({COLLECTION}))
 REMEDY = "the same `simgen generate` command makes it again from the datasets"
-COLLECTION_FOLDER = FolderKind(
-    "collection",
-    COLLECTION,
-    version=1,
-    absent=f"not a collection (no {COLLECTION}); make one with `simgen generate`",
-    remedy=REMEDY,
-    marks=frozenset({COLLECTION}),
-    passing=frozenset({LOCK}),
-    has_checksum=True,
-)
 Split = Literal["train", "validation", "test"]
 Half = Literal["development", "test"]
 """Of a benchmark: methods are made on the one, and what is reported is of the other."""
@@ -57,6 +46,7 @@ IN_FRAMES = ", binary frames"
 class Collection(ShortForm, Sequence[Dataset]):
     """Datasets of one folder in the order of its index, each opened, and checked, when it is asked for.
 
+    A slice selects some, and so does a mask, such as `collection[collection.table()["split"] == "train"]`.
     `rows` are what the index says of each: `path`, `values` of the swept fields of the recipe, `scene`,
     `scene_number`, `seed`, `split`, `photons`.
     """
@@ -67,12 +57,7 @@ class Collection(ShortForm, Sequence[Dataset]):
     rows: tuple[Mapping[str, Any], ...]
 
     def _facts(self) -> dict[str, object]:
-        ends = {name: self._ends(name) for name in self.fields}
-        return {"name": self.path.resolve().name, "datasets": len(self), **ends}
-
-    def _ends(self, field: str) -> str:
-        values = list(dict.fromkeys(str(row["values"][field]) for row in self.rows))
-        return listed(values) if len(values) <= 4 else f"{len(values)} values"
+        return {"name": self.path.resolve().name, "datasets": len(self), "fields": listed(self.fields)}
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -80,50 +65,25 @@ class Collection(ShortForm, Sequence[Dataset]):
     @overload
     def __getitem__(self, number: int) -> Dataset: ...
     @overload
-    def __getitem__(self, number: slice) -> "Collection": ...
-    def __getitem__(self, number: int | slice) -> "Dataset | Collection":
+    def __getitem__(self, number: "slice | Iterable[bool]") -> "Collection": ...
+    def __getitem__(self, number: "int | slice | Iterable[bool]") -> "Dataset | Collection":
         if isinstance(number, slice):
             return replace(self, rows=self.rows[number])
-        return open_dataset(check_manifest(self.path, self.rows[number]))
-
-    def where(
-        self, condition: Callable[[Mapping[str, Any]], bool] | None = None, /, **values: Any
-    ) -> "Collection":
-        """The datasets of whose row `condition` is true and which have these values.
-
-        Values are of columns and of swept fields; of a dotted field the last part is enough where that is
-        unique: `where(budget=300, split="train")`. Raises `InputError` for an unknown name, and for a value
-        that no dataset has.
-        """
-        named = {self._column(name): value for name, value in values.items()}
-        for column, value in named.items():
-            present = [_cell(row, column) for row in self.rows]
-            if present and value not in present:
-                known = listed(list(dict.fromkeys(map(str, present))))
-                raise InputError(f"where: no dataset has {column} = {value!r}; there are {known}")
-        rows = [
-            row
-            for row in self.rows
-            if all(_cell(row, column) == value for column, value in named.items())
-            and (condition is None or condition(row))
-        ]
-        return replace(self, rows=tuple(rows))
+        if not isinstance(number, Iterable):
+            return open_dataset(check_manifest(self.path, self.rows[number]))
+        mask = list(number)
+        if len(mask) != len(self) or not {*mask} <= {False, True}:
+            raise InputError(f"collection: expected a number, a slice or {len(self)} values True or False")
+        return replace(
+            self, rows=tuple(row for row, is_wanted in zip(self.rows, mask, strict=True) if is_wanted)
+        )
 
     def table(self) -> "pandas.DataFrame":
         """A row for each dataset: its folder, scene, split, photons, and the fields that differ."""
         import pandas
 
-        columns = dict.fromkeys([*COLUMNS, *self.fields])
-        return pandas.DataFrame({name: [_cell(row, name) for row in self.rows] for name in columns})
-
-    def _column(self, name: str) -> str:
-        known = [*COLUMNS, *self.fields]
-        matching = [column for column in self.fields if column.rsplit(".", 1)[-1] == name]
-        if name in known:
-            return name
-        if len(matching) == 1:
-            return matching[0]
-        raise InputError(f"where: there is no column {name!r}; there are {', '.join(dict.fromkeys(known))}")
+        rows = [{name: row[name] for name in COLUMNS} | dict(row["values"]) for row in self.rows]
+        return pandas.DataFrame(rows, columns=list(dict.fromkeys([*COLUMNS, *self.fields])))
 
 
 def open_collection(path: str | Path) -> Collection:
@@ -134,10 +94,6 @@ def open_collection(path: str | Path) -> Collection:
     root = Path(path)
     document, rows = read_collection(root), read_index(root)
     return Collection(root, tuple(document.fields), tuple(rows))
-
-
-def _cell(row: Mapping[str, Any], column: str) -> Any:
-    return row["values"][column] if column in row["values"] else row.get(column)
 
 
 def split_of(scene_number: int) -> Split:

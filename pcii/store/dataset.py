@@ -1,7 +1,7 @@
 """Datasets: counts, truth and radiance of a dataset folder, each checked when it is read."""
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,14 +18,13 @@ from pcii.store.dataset_layout import (
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
-    REMEDY,
     TRUTH,
     nested_name,
     radiance_name,
     read_exr,
     read_manifest,
 )
-from pcii.store.folders import check_file, check_files, check_free, lists_part
+from pcii.store.folders import Files, check_file, check_free, lists_part
 from pcii.store.zarr_groups import read_array
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.types.camera_grid import CameraGrid
@@ -58,21 +57,23 @@ def budget_of(text: str) -> float | Literal["full-light"]:
 
 
 class StoredRadiance:
-    """Radiance (K, L, H, W, C), float32: [k, l] reads one view (H, W, C), `np.asarray` all of them.
+    """Radiance (K, L, H, W, C), float32: [k, l] reads one view (H, W, C), `np.asarray` all of them."""
 
-    `file_of` (k, l) returns the path of the file of a view, which it has checked.
-    """
+    dtype = np.dtype(np.float32)
 
-    def __init__(self, shape: tuple[int, int, int, int, int], file_of: Callable[[int, int], Path]) -> None:
+    def __init__(self, root: Path, files: Files, shape: tuple[int, int, int, int, int]) -> None:
         self.shape = shape
-        self.dtype = np.dtype(np.float32)
-        self._file_of = file_of
+        self._root, self._files = root, files
 
     def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         K, L = self.shape[:2]
         if index not in np.ndindex(K, L):
             raise InputError(f"radiance: read one of {K} x {L} views by [k, l], or all by numpy.asarray")
-        return read_exr(self._file_of(*index), self.shape[2:])
+        name = radiance_name(*index)
+        if name not in self._files:
+            raise InputError(f"{self._root}: the manifest lists no {name}")
+        check_file(self._root, name, self._files[name])
+        return read_exr(self._root / name, self.shape[2:])
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
         """All views, read into memory; raises `ValueError` if NumPy asks for them without a copy."""
@@ -105,26 +106,21 @@ class Dataset(ShortForm):
 
     def _facts(self) -> dict[str, object]:
         parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
-        budgets = listed([budget or "exposure" for budget in self.budgets])
         return {
             "name": self.name,
             "shape": times(self.grid.shape_KLHW),
             "cfa": self.cfa,
-            "budgets": budgets if self.budgets else None,
+            "budgets": listed([budget or "exposure" for budget in self.budgets]) if self.budgets else None,
             "z_mm": listed(self.analysis.get("z_mm") or ()),
             "has": listed([name for name, part in parts.items() if self.has(part)]),
         }
 
     @property
     def budgets(self) -> tuple[float | None, ...]:
-        """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure.
-
-        They are those of the recipe or, of images by others, that which was stated. Without counts there are
-        none.
-        """
+        """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure."""
         if not self.has(COUNTS):
             return ()
-        photons = self.manifest.recipe.get("photons", {})
+        photons = self.manifest.recipe.get("photons", {})  # those of others state their budget alone
         largest = None if photons.get("scope") == "exposure" else photons.get("budget")
         return (*sorted(photons.get("nested") or []), self.manifest.photon_budget or largest)
 
@@ -172,11 +168,10 @@ class Dataset(ShortForm):
     def counts(self) -> PhotonCounts:
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
-        if part is None or not self.has(part):
-            what = f"{FULL_LIGHT} is the radiance, and this needs" if part is None else "this dataset has no"
+        if part is None or not self.has_counts:
             raise InputError(
-                f"{self.path}: {what} photon counts; import the images with --photons N, or generate it with "
-                "products.counts = true"
+                f"{self.path}: there are no photon counts in this light; import the images with --photons N, "
+                "or generate the dataset with products.counts = true"
             )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         if self.has(f"{part}/{FRAME}"):
@@ -234,11 +229,9 @@ class Dataset(ShortForm):
             return None
         channels = self.manifest.radiance_channels
         if channels is None:
-            raise InputError(
-                f"{self.path / MANIFEST}: radiance_channels: missing, though it lists {RADIANCE}"
-            )
-        cfa = self.cfa if channels == 1 else None
-        return Views(StoredRadiance((*self.grid.shape_KLHW, channels), self._view_file), self.grid, cfa)
+            raise InputError(f"{self.path / MANIFEST}: radiance_channels: missing, though it has {RADIANCE}")
+        radiance = StoredRadiance(self.path, self.manifest.files, (*self.grid.shape_KLHW, channels))
+        return Views(radiance, self.grid, self.cfa if channels == 1 else None)
 
     @property
     def counts_or_views(self) -> PhotonCounts | Views:
@@ -250,24 +243,13 @@ class Dataset(ShortForm):
         """Whether the manifest lists the file `part`, or files of a folder of this name."""
         return lists_part(self.manifest.files, part)
 
-    def _view_file(self, k: int, l: int) -> Path:
-        """File of the radiance of a view, after a check of its hash."""
-        name = radiance_name(k, l)
-        if name not in self.manifest.files:
-            raise InputError(f"{self.path}: the manifest lists no {name}")
-        check_file(self.path, name, self.manifest.files[name], REMEDY, content=True)
-        return self.path / name
-
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
         K, L, H, W = self.grid.shape_KLHW
         sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
         files = self.manifest.files
-        return {
-            name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
-            for name in names
-        }
+        return {name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes) for name in names}
 
 
 def open_dataset(path: str | Path) -> Dataset:
@@ -282,7 +264,8 @@ def open_dataset(path: str | Path) -> Dataset:
     """
     root = Path(path)
     manifest = read_manifest(root)
-    check_files(root, manifest.files, REMEDY, content=False)
+    for name, entry in manifest.files.items():
+        check_file(root, name, entry, content=False)
     return Dataset(root, manifest)
 
 

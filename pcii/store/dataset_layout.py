@@ -39,16 +39,7 @@ PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
 WORTH_ZIP = 0.9
 """Radiance is compressed if it then takes at most this share of its bytes."""
-REMEDY = "generate the dataset again"
-DATASET_FOLDER = FolderKind(
-    "dataset",
-    MANIFEST,
-    version=2,
-    absent=f"not a finished dataset (no {MANIFEST}); make one with `simgen generate`",
-    remedy=REMEDY,
-    marks=frozenset({MANIFEST, MARKER}),
-    has_checksum=True,
-)
+DATASET_FOLDER = FolderKind("dataset", MANIFEST, 2, "simgen generate", frozenset({MANIFEST, MARKER}))
 
 
 def radiance_name(k: int, l: int) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import named_in_errors, replace_folder, temporary_folder
+from pcii.base.safe_files import named_in_errors, new_folder_safely
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import (
     COUNTS,
@@ -77,9 +77,7 @@ def save_dataset(
     stated: dict[str, Any] = {"title": title, "licence": licence, "citation": citation, "origin": origin}
     if radiance_unit is not None:
         stated["radiance_unit"] = radiance_unit
-    maps = {} if truth is None else _stored_maps(truth, counts or views)
-    if view_z_mm is not None:
-        maps["view_z_mm"] = _checked_depths(view_z_mm, counts or views)
+    maps = _stored_maps(truth, view_z_mm, counts or views)
     analysis: dict[str, Any] = {} if z_mm is None else {"z_mm": check_z_mm(z_mm).tolist()}
     if z_range_mm is not None:
         analysis["z_range_mm"] = check_depth_range(z_range_mm)
@@ -87,7 +85,7 @@ def save_dataset(
     check_free(out, "dataset")
     with named_in_errors(out):
         out.parent.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(out) as new:
+        with new_folder_safely(out) as new:
             if counts is not None:
                 write_counts(new / COUNTS, counts)
             if views is not None:
@@ -95,15 +93,12 @@ def save_dataset(
             if maps:
                 write_arrays_safely(new / TRUTH, maps, TRUTH_LABELS)
             if truth is not None and truth.photons is not None:
-                _check_origins(truth.photons, counts)
-                ids = np.asarray(truth.photons.object_id).astype(np.int32)
-                write_photon_truth(new / PHOTON_TRUTH, ids, _as_stored(truth.photons.z_mm))
+                _write_origins(new / PHOTON_TRUTH, truth.photons, counts)
             manifest = stated | _content(new, counts, views, truth)
             manifest |= {"analysis": analysis, "photon_budget": photon_budget and float(photon_budget)}
             manifest |= {"versions": versions(PACKAGE, "numpy", "zarr")}
             validated(DatasetManifest, manifest)
             write_manifest(new, manifest)
-            replace_folder(new, out)
     return open_dataset(path)
 
 
@@ -131,41 +126,43 @@ def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) ->
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
     """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
     parts = images if isinstance(images, tuple | list) else [images]
-    counts = [part for part in parts if isinstance(part, PhotonCounts)]
-    views = [part for part in parts if isinstance(part, Views)]
-    if len(counts) + len(views) != len(parts) or not parts or len(counts) > 1 or len(views) > 1:
+    by_kind = {type(part): part for part in parts}
+    counts, views = by_kind.get(PhotonCounts), by_kind.get(Views)
+    if not parts or (counts is not None) + (views is not None) != len(parts):
         kinds = ", ".join(type(part).__name__ for part in parts) or "nothing"
         raise InputError(f"images: expected PhotonCounts, Views, or one of each, got {kinds}")
-    if counts and views:
-        if counts[0].grid != views[0].grid:
+    if counts is not None and views is not None:
+        if counts.grid != views.grid:
             raise InputError("images: the photon counts and the views are of different camera grids")
-        patterns = counts[0].cfa, views[0].cfa
-        if views[0].radiance.shape[4] == 1 and patterns[0] != patterns[1]:
-            raise InputError(f"images: expected the same Bayer pattern, got {patterns[0]} and {patterns[1]}")
-    return counts[0] if counts else None, views[0] if views else None
+        if views.radiance.shape[4] == 1 and counts.cfa != views.cfa:
+            raise InputError(f"images: expected the same Bayer pattern, got {counts.cfa} and {views.cfa}")
+    return counts, views
 
 
 def check_depth_range(z_range_mm: object) -> list[float]:
     """The nearest and farthest depth in mm; raises `InputError` for anything else."""
-    try:
-        near, far = check_z_mm(z_range_mm)
-    except (InputError, ValueError):
-        near, far = 1, 0
-    if not near < far:
+    depths = check_z_mm(z_range_mm).tolist()
+    if len(depths) != 2 or depths[0] >= depths[1]:
         raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
-    return [float(near), float(far)]
+    return depths
 
 
-def _stored_maps(truth: object, images: Any) -> dict[str, np.ndarray]:
-    """The maps of the virtual centre as they are stored; `InputError` unless they are of the images' size."""
-    if not isinstance(truth, Truth):
-        raise InputError(f"truth: expected Truth, got {type(truth).__name__}")
-    size = images.grid.height, images.grid.width
-    if truth.z_mm.shape != size or truth.object_id.dtype.kind not in "iu":
-        raise InputError(f"truth: expected depths and whole object ids of {size}, as the images")
-    maps = {"z_mm": _as_stored(truth.z_mm), "object_id": truth.object_id.astype(np.int32)}
-    optional = {name: getattr(truth, name) for name in OPTIONAL_MAPS}
-    return maps | {name: array for name, array in optional.items() if array is not None}
+def _stored_maps(truth: Truth | None, view_z_mm: np.ndarray | None, images: Any) -> dict[str, np.ndarray]:
+    """The maps as they are stored; `InputError` unless they are of the images' size."""
+    maps = dict[str, np.ndarray]()
+    if truth is not None:
+        size = images.grid.shape_HW
+        if not isinstance(truth, Truth) or truth.z_mm.shape != size or truth.object_id.dtype.kind not in "iu":
+            raise InputError(f"truth: expected a Truth of depths and whole object ids of {size}")
+        maps = {"z_mm": _as_stored(truth.z_mm), "object_id": truth.object_id.astype(np.int32)}
+        optional = {name: getattr(truth, name) for name in OPTIONAL_MAPS}
+        maps |= {name: array for name, array in optional.items() if array is not None}
+    if view_z_mm is not None:
+        shape, depths = images.grid.shape_KLHW, np.asarray(view_z_mm)
+        if depths.shape != shape or depths.dtype.kind not in "fiu" or not (depths > 0).all():
+            raise InputError(f"view_z_mm: expected depths of {shape}, above 0 mm, a miss being +inf")
+        maps["view_z_mm"] = depths.astype(np.float32)
+    return maps
 
 
 def _as_stored(z_mm: np.ndarray) -> np.ndarray:
@@ -173,22 +170,15 @@ def _as_stored(z_mm: np.ndarray) -> np.ndarray:
     return z_mm if z_mm.dtype == np.float32 else z_mm.astype(np.float64)
 
 
-def _checked_depths(view_z_mm: object, images: Any) -> np.ndarray:
-    """True depths of every view as float32; `InputError` unless they are of the images, and depths."""
-    shape, maps = images.grid.shape_KLHW, np.asarray(view_z_mm)
-    if maps.shape != shape or maps.dtype.kind not in "fiu" or not (maps > 0).all():
-        raise InputError(f"view_z_mm: expected depths of {shape}, above 0 mm, a miss being +inf")
-    return maps.astype(np.float32)
-
-
-def _check_origins(photons: PhotonTruth, counts: PhotonCounts | None) -> None:
-    """Raise `InputError` unless the origins are those of the counts, photon by photon."""
+def _write_origins(folder: Path, photons: PhotonTruth, counts: PhotonCounts | None) -> None:
+    """Write the origins of the counts' photons; `InputError` unless they are in the order of the events."""
     if counts is None:
         raise InputError("truth: photons: there are no photon counts that they belong to")
     events = counts.events
     for name in "klij":
         if not np.array_equal(getattr(photons, name), getattr(events, name).repeat(events.n)):
             raise InputError("truth: photons: not those of the counts, in the order of their events")
+    write_photon_truth(folder, photons.object_id.astype(np.int32), _as_stored(photons.z_mm))
 
 
 def _write_radiance(root: Path, views: Views) -> None:

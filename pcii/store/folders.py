@@ -1,8 +1,7 @@
 """Folders that list their files: hashes, lists of files, and the document that makes a folder a finished one.
 
-The document is JSON: its format and version, and, of all kinds but collections, every file with size and
-SHA-256. That of a dataset or a collection ends in "sha256", a checksum of itself: the SHA-256 of its bytes
-with 64 zeros in that place.
+The document is JSON: its format and version and, of all kinds but collections, every file with size and
+SHA-256. It ends in "sha256", a checksum of itself: the SHA-256 of its bytes with 64 zeros in that place.
 
 results.json      of results: their dataset by name and identity, the light, the software
 evaluation.json   of an evaluation: what measured its rows; beside it rows.jsonl, a line of JSON for each
@@ -30,6 +29,10 @@ LARGEST_DOCUMENT_BYTES = 1 << 27
 RESULTS = "results.json"
 ROWS = "rows.jsonl"
 EVALUATION = "evaluation.json"
+LOCK = ".lock"
+"""Locked while a run writes to the folder of a collection, and then removed."""
+REMEDY = "delete the folder and make it again"
+"""How errors about damaged files end."""
 _NO_CHECKSUM = "0" * 64
 
 
@@ -69,25 +72,21 @@ def lists_part(files: Iterable[str], part: str) -> bool:
     return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
-def check_file(root: Path, name: str, entry: Mapping[str, Any], remedy: str, *, content: bool) -> None:
+def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool = True) -> None:
     """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
     path = root / name
     try:
         if not path.is_file():
-            raise InputError(f"{path}: listed in the manifest but missing; {remedy}")
-        if (size := path.stat().st_size) != entry["bytes"]:
-            expected = f"{size} bytes where the manifest says {entry['bytes']}"
-            raise InputError(f"{path}: truncated or changed, {expected}; {remedy}")
-        if content and hash_file(path) != entry["sha256"]:
-            raise InputError(f"{path}: its content does not match the manifest's SHA-256; {remedy}")
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
-
-
-def check_files(root: Path, files: Files, remedy: str, *, content: bool) -> None:
-    """Raise `InputError` for the first listed file that is not as `check_file` wants it."""
-    for name, entry in files.items():
-        check_file(root, name, entry, remedy, content=content)
+            fault = "listed in the manifest but missing"
+        elif path.stat().st_size != entry["bytes"]:
+            fault = f"truncated or changed, expected {entry['bytes']} bytes"
+        elif content and hash_file(path) != entry["sha256"]:
+            fault = "its content does not match the manifest's SHA-256"
+        else:
+            return
+    except OSError as error:
+        fault = f"cannot be read ({error.strerror})"
+    raise InputError(f"{path}: {fault}; {REMEDY}")
 
 
 def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
@@ -117,16 +116,10 @@ class FolderKind:
     what: str
     document: str
     version: int
-    absent: str
-    """What errors say of a folder without the document."""
-    remedy: str
-    """How an error about a damaged document ends."""
+    command: str
+    """The command that makes such folders."""
     marks: frozenset[str]
     """Files of which every such folder has one, finished or not."""
-    passing: frozenset[str] = frozenset()
-    """Files that may be in a folder before it is one of this kind, as for a lock."""
-    has_checksum: bool = False
-    """Whether the document ends in a checksum of itself."""
 
     @property
     def format(self) -> str:
@@ -138,8 +131,8 @@ class FolderKind:
 
         Raises `InputError` for a file, and for a folder that holds something else.
         """
-        names = entries(folder, self.what) - self.passing
-        names = {name for name in names if not name.startswith(f".{self.document}.")}  # left by a kill
+        left_by_a_kill = f".{self.document}."
+        names = {name for name in entries(folder, self.what) if not name.startswith((LOCK, left_by_a_kill))}
         if names and not names & self.marks:
             raise InputError(f"{folder}: holds something else; name a new or empty folder")
         return names
@@ -147,9 +140,6 @@ class FolderKind:
     def write(self, folder: Path, content: Mapping[str, Any]) -> None:
         """Write the document, atomically."""
         document = {"format": self.format, "format_version": self.version, **content}
-        if not self.has_checksum:
-            write_bytes_safely(folder / self.document, json_bytes(document))
-            return
         blank = json_bytes({**document, "sha256": _NO_CHECKSUM})
         before, after = blank.rsplit(_NO_CHECKSUM.encode(), 1)
         write_bytes_safely(folder / self.document, before + hash_bytes(blank).encode() + after)
@@ -162,31 +152,21 @@ class FolderKind:
         if not folder.is_dir():
             raise InputError(f"{folder}: there is no such {self.what} folder")
         if not path.is_file():
-            raise InputError(f"{folder}: {self.absent}")
-        content = read_small(path, LARGEST_DOCUMENT_BYTES, self.remedy)
+            raise InputError(
+                f"{folder}: not a finished {self.what} (no {self.document}); `{self.command}` makes one"
+            )
+        content = read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY)
         try:
             document = json.loads(content)
-        except (ValueError, RecursionError) as fault:
-            raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); {self.remedy}") from None
-        if not isinstance(document, dict):
-            raise InputError(f"{path}: damaged, it is not a JSON object; {self.remedy}")
-        checksum = str(document.pop("sha256", None))
-        if self.has_checksum and not _fits_checksum(content, checksum):
-            raise InputError(f"{path}: changed since it was written, or of another release; {self.remedy}")
-        release = document.get("format"), document.get("format_version")
-        if release != (self.format, self.version):
-            wanted = f"a {self.format} of version {self.version}"
-            raise InputError(f"{path}: expected {wanted}, got {release[0]!r}, {release[1]!r}; {self.remedy}")
-        try:
+            checksum = document.pop("sha256").encode()
+            before, _, after = content.rpartition(checksum)
+            if hash_bytes(before + _NO_CHECKSUM.encode() + after).encode() != checksum:
+                raise ValueError("its checksum does not match")
+            if (document.get("format"), document.get("format_version")) != (self.format, self.version):
+                raise ValueError(f"expected a {self.format} of version {self.version}")
             return validated(model, document)
-        except InputError as fault:
-            raise InputError(f"{path}: {fault}; {self.remedy}") from None
-
-
-def _fits_checksum(content: bytes, checksum: str) -> bool:
-    """Whether a checksum is that of the document which it is the last member of."""
-    before, _, after = content.rpartition(checksum.encode(errors="replace"))
-    return hash_bytes(before + _NO_CHECKSUM.encode() + after) == checksum
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as fault:
+            raise InputError(f"{path}: damaged, or of another release ({fault}); {REMEDY}") from None
 
 
 def entries(folder: Path, what: str) -> set[str]:
@@ -205,22 +185,8 @@ def check_free(folder: Path, what: str) -> None:
         raise InputError(f"{folder}: holds something else; name a new or empty folder")
 
 
-RESULTS_FOLDER = FolderKind(
-    "results",
-    RESULTS,
-    version=3,
-    absent=f"not a folder of results (no {RESULTS}); name one that `pcii run` made",
-    remedy="make the results again in a new folder",
-    marks=frozenset({RESULTS}),
-)
-EVALUATION_FOLDER = FolderKind(
-    "evaluation",
-    EVALUATION,
-    version=2,
-    absent="unfinished; the same `pcii evaluate` command goes on from here",
-    remedy="repeat the `pcii evaluate` command, which writes it again",
-    marks=frozenset({ROWS}),
-)
+RESULTS_FOLDER = FolderKind("results", RESULTS, 4, "pcii run", frozenset({RESULTS}))
+EVALUATION_FOLDER = FolderKind("evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS}))
 
 
 def read_results(out: Path) -> "ResultsManifest":

@@ -2,24 +2,17 @@
 
 import hashlib
 import platform
-import re
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pcii.store.folders import hash_file
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 PACKAGE = "photon-integral-imaging"
 COMPUTING = ("numpy", "scipy", "scikit-image", "numba", "llvmlite", "onnxruntime")
 """Other packages by which this one computes: another version may give another result."""
-_SOURCE = "source of "
 
 
 def versions(*packages: str) -> dict[str, str]:
@@ -30,23 +23,19 @@ def versions(*packages: str) -> dict[str, str]:
 @cache
 def own_software() -> dict[str, str]:
     """Versions of this package and of what it computes by, and the hash of its source."""
-    source = {f"{_SOURCE}{PACKAGE}": hash_of_source([Path(__file__).parents[1]])}
+    source = {f"source of {PACKAGE}": hash_of_source(Path(__file__).parents[1])}
     return versions(PACKAGE) | source | {"python": platform.python_version()} | versions(*COMPUTING)
 
 
-def software_of_entry_point(point: "EntryPoint") -> dict[str, str]:
-    """Version and source, as it is now, of the package that an entry point is of."""
-    package = point.dist
-    modules = {point.module.partition(".")[0]}
-    if package is None:
-        return {f"{_SOURCE}{point.module}": hash_of_source(_places(modules))}
-    modules |= set((package.read_text("top_level.txt") or "").split())
-    software = {package.name: package.version, f"{_SOURCE}{package.name}": hash_of_source(_places(modules))}
-    for requirement in package.requires or ():
-        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        with suppress(PackageNotFoundError):
-            software[name] = version(name)
-    return software
+def software_with(place: str) -> dict[str, str]:
+    """This software, and the hash of the source of a module (of its whole package), or of a file "x.py"."""
+    if place.endswith(".py"):
+        return own_software() | {f"source of {place}": hash_of_source(Path(place))}
+    package = place.partition(".")[0]
+    spec = find_spec(package)
+    assert spec is not None
+    source = next(iter(spec.submodule_search_locations or ()), spec.origin)
+    return own_software() | {f"source of {package}": hash_of_source(Path(str(source)))}
 
 
 def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:
@@ -63,29 +52,16 @@ def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None)
     for name in sorted({*before, *now}):
         old, new = before.get(name, "absent"), now.get(name, "absent")
         if old != new:
-            is_source = name.startswith(_SOURCE)
+            is_source = name.startswith("source of ")
             changes.append(f"the {name} has changed" if is_source else f"{name} {old} is now {new}")
     return ", ".join(changes)
 
 
-def hash_of_source(places: Iterable[Path]) -> str:
-    """Hash of all files of these folders and files, but for hidden and compiled ones: also of weights."""
+def hash_of_source(place: Path) -> str:
+    """Hash of a file, or of all files of a folder but for hidden and compiled ones: also of weights."""
     content = hashlib.sha256()
-    for place in places:
-        for file in [place] if place.is_file() else sorted(place.rglob("*")):
-            name = file.relative_to(place.parent)
-            if file.is_file() and not any(part.startswith((".", "__pycache__")) for part in name.parts):
-                content.update(f"{name.as_posix()}\0{hash_file(file)}\0".encode())
+    for file in [place] if place.is_file() else sorted(place.rglob("*")):
+        name = file.relative_to(place.parent)
+        if file.is_file() and not any(part.startswith((".", "__pycache__")) for part in name.parts):
+            content.update(f"{name.as_posix()}\0{hash_file(file)}\0".encode())
     return content.hexdigest()[:16]
-
-
-def _places(modules: Iterable[str]) -> list[Path]:
-    """Files and folders of modules at the top level, without importing them."""
-    places: list[Path] = []
-    for name in sorted(modules):
-        spec = find_spec(name)
-        if spec is not None and spec.submodule_search_locations is not None:
-            places += map(Path, spec.submodule_search_locations)
-        elif spec is not None and spec.has_location and spec.origin is not None:
-            places.append(Path(spec.origin))
-    return places

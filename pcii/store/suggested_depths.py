@@ -11,17 +11,28 @@ from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import disparity_px
 
 
-def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
-    """Focal planes at `z_mm`, else at the depths of the recipe.
+def planes_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> FocalPlanes:
+    """Focal planes at the depths `z_mm`, else at those that the recipe suggests.
 
     Raises `InputError` if there are none, or if no views overlap at one.
     """
-    depths = z_mm or dataset.analysis.get("z_mm") or ()
-    if not len(depths):
-        raise InputError(f"{dataset.path}: suggests no depths; name depths with --z-mm")
+    depths = z_mm or dataset.analysis.get("z_mm")
+    if not depths:
+        raise InputError(f"{dataset.path}: suggests no depths; name them with --z-mm or --z-range-mm")
     planes = FocalPlanes.at_depths(dataset.grid, depths)
     _check_overlap(dataset.grid, planes.z_mm, "z_mm")
     return planes
+
+
+def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
+    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of those of `planes_of`."""
+    suggested = dataset.analysis.get("z_range_mm")
+    if not suggested:
+        z = planes_of(dataset, z_mm).z_mm
+        return 0.8 * float(z.min()), 1.25 * float(z.max())
+    near, far = map(float, suggested)
+    _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
+    return near, far
 
 
 def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
@@ -31,21 +42,3 @@ def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
     if grid.view_count > 1 and not overlap.all():
         z = depths_mm[~overlap][0]
         raise InputError(f"{name}: {z:g} mm is so near that no views overlap; depths are in mm")
-
-
-def depth_range_of(
-    dataset: Dataset, z_mm: Sequence[float] | FocalPlanes | None = None
-) -> tuple[float, float]:
-    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths.
-
-    The planes are `z_mm`, or those that `planes_of` finds at these depths.
-    """
-    suggested = dataset.analysis.get("z_range_mm")
-    if suggested:
-        near, far = float(suggested[0]), float(suggested[1])
-        _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
-        return near, far
-    if z_mm is None and not dataset.analysis.get("z_mm"):
-        raise InputError(f"{dataset.path}: suggests no range of depths; name one with --z-range-mm NEAR FAR")
-    z = (z_mm if isinstance(z_mm, FocalPlanes) else planes_of(dataset, z_mm)).z_mm
-    return 0.8 * float(z.min()), 1.25 * float(z.max())

@@ -13,7 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import new_folder_safely
-from pcii.store.folders import Files, check_file, lists_part
+from pcii.store.folders import REMEDY, Files, check_file
 from pcii.types.array_labels import Label
 
 CHUNK_ELEMENTS = 1 << 20
@@ -28,35 +28,20 @@ def write_arrays_safely(
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a group of arrays atomically. `labels` has one for each array."""
-    with new_folder_safely(folder) as temporary:
-        write_arrays(temporary, arrays, labels, attributes)
-
-
-def write_arrays(
-    folder: Path,
-    arrays: Mapping[str, np.ndarray],
-    labels: Mapping[str, Label],
-    attributes: Mapping[str, Any] | None = None,
-) -> None:
-    """Write a group of arrays to a new folder, for callers that see to atomic writing themselves."""
-    group = _new_group(folder, attributes or {})
-    for name, array in arrays.items():
-        stored = new_array(group, name, array.shape, array.dtype, labels[name])
-        if array.size:
-            stored[...] = array
+    with new_group_safely(folder, attributes or {}) as group:
+        for name, array in arrays.items():
+            stored = new_array(group, name, array.shape, array.dtype, labels[name])
+            if array.size:
+                stored[...] = array
 
 
 @contextmanager
 def new_group_safely(folder: Path, attributes: Mapping[str, Any]) -> Iterator[Any]:
     """A new Zarr v3 group to write to, which becomes `folder` when the block ends without an exception."""
-    with new_folder_safely(folder) as temporary:
-        yield _new_group(temporary, attributes)
-
-
-def _new_group(folder: Path, attributes: Mapping[str, Any]) -> Any:
     import zarr
 
-    return zarr.open_group(folder, mode="w", zarr_format=3, attributes=dict(attributes))
+    with new_folder_safely(folder) as temporary:
+        yield zarr.open_group(temporary, mode="w", zarr_format=3, attributes=dict(attributes))
 
 
 def new_array(group: Any, name: str, shape: tuple[int, ...], dtype: Any, label: Label) -> Any:
@@ -89,22 +74,18 @@ def chunk_shape(shape: Iterable[int]) -> tuple[int, ...]:
     return tuple(chunks)
 
 
-def read_array(
-    root: Path, name: str, files: Files, label: Label, sizes: Mapping[str, int], remedy: str
-) -> np.ndarray:
+def read_array(root: Path, name: str, files: Files, label: Label, sizes: Mapping[str, int]) -> np.ndarray:
     """The array `name` (group/array) of the folder `root`, whose `files` have these sizes and hashes.
 
-    `sizes` are the lengths of the axes of `label` by name, as far as they are known. Raises `InputError`,
-    which ends in `remedy`, for a missing or changed file, and for an array that `new_array` does not write.
+    `sizes` are the lengths of the axes of `label` by name, as far as they are known. Raises `InputError` for
+    a missing or changed file, and for an array that `new_array` does not write.
     """
     import zarr
 
     path = root / name
-    if not lists_part(files, name):
-        raise InputError(f"{path}: the manifest lists no such array; {remedy}")
-    for file, entry in files.items():
-        if file.startswith(f"{name}/"):
-            check_file(root, file, entry, remedy, content=True)
+    own = {file: entry for file, entry in files.items() if file.startswith(f"{name}/")}
+    for file, entry in own.items():
+        check_file(root, file, entry)
     try:
         stored = zarr.open_array(path, mode="r", zarr_format=3)
         expected = tuple(sizes.get(dim, size) for dim, size in zip(label.dims, stored.shape, strict=True))
@@ -112,9 +93,9 @@ def read_array(
             raise ValueError(f"expected a shape of {expected}, got {stored.shape}")
         if stored.dtype.name not in DTYPES:
             raise ValueError(f"expected one of {', '.join(DTYPES)}, got {stored.dtype}")
-        chunks = sum(file.startswith(f"{name}/c") for file in files)
+        chunks = sum(file.startswith(f"{name}/c") for file in own)
         if chunks != stored.nchunks:  # Zarr reads a missing chunk as zeros
             raise ValueError(f"expected {stored.nchunks} chunks, the manifest lists {chunks}")
         return np.asarray(stored[...])
     except Exception as fault:  # decoders raise various exceptions for damaged content
-        raise InputError(f"{path}: cannot be read ({visible(str(fault))}); {remedy}") from None
+        raise InputError(f"{path}: cannot be read ({visible(str(fault))}); {REMEDY}") from None

@@ -148,8 +148,7 @@ def make(
     """Make the datasets of a benchmark, and compare them with the published ones; run again to resume.
 
     OUT is a collection with a folder for each dataset, and certificate.json, which says whether they have the
-    published bytes or, on another kind of machine, are draws of the same light, on which a simple method has
-    the published scores.
+    published bytes or, on another kind of machine, photons that are draws of the same light.
 
     Examples of use:
 
@@ -168,8 +167,7 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from pcii.store.benchmark_layout import CERTIFICATE
-    from simgen.dataset.benchmark_making import certify, load_definition, make_benchmark
+    from simgen.dataset.benchmark_making import CERTIFICATE, certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)

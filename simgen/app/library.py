@@ -81,7 +81,7 @@ def generate_collection(
 
     >>> collection = generate_collection("paper", "out/dimmer", ["photons.budget=[100,300]"], seeds=5,
     ...                                  executor=Executor(workers=2))                      # doctest: +SKIP
-    >>> [dataset.counts.total for dataset in collection.where(budget=100)]          # doctest: +SKIP
+    >>> [dataset.counts.total for dataset in collection]                                 # doctest: +SKIP
     """
     sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes, trust_python=trust_python)
     if not sweep.axes:

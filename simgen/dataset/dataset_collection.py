@@ -14,7 +14,6 @@ from pcii.store.collection import (
     COLLECTION,
     COLLECTION_FOLDER,
     INDEX,
-    LOCK,
     check_manifest,
     index_row,
     read_collection,
@@ -22,6 +21,7 @@ from pcii.store.collection import (
     write_index,
 )
 from pcii.store.dataset_layout import MANIFEST, MARKER
+from pcii.store.folders import LOCK
 from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_dataset, other_versions
 from simgen.dataset.generation import Reuse, make
 from simgen.dataset.prepared import prepare
@@ -111,14 +111,11 @@ def _claim(out: Path) -> Iterator[None]:
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
     COLLECTION_FOLDER.guard(out)
-    try:
-        with locked(out / LOCK, wait=False):
-            try:
-                yield
-            finally:
-                (out / LOCK).unlink(missing_ok=True)
-    except BlockingIOError:
-        raise InputError(f"{out}: another run is writing this collection") from None
+    with locked(out / LOCK, out):
+        try:
+            yield
+        finally:
+            (out / LOCK).unlink(missing_ok=True)
 
 
 def _begin(series: Series, out: Path) -> None:

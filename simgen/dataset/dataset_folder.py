@@ -10,8 +10,8 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked
 from pcii.store import software
-from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, REMEDY, read_written_manifest
-from pcii.store.folders import check_files
+from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
+from pcii.store.folders import check_file
 from pcii.store.manifests import DatasetManifest
 from pcii.store.software import PACKAGE
 
@@ -52,8 +52,8 @@ def read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
     manifest = read_written_manifest(out)
     if manifest.identity != identity:
         raise other_dataset(out, "dataset", manifest.versions)
-    # The folder has to be deleted, since what is in it is kept as long as it is there.
-    check_files(out, manifest.files, f"{REMEDY}, after deleting {out}", content=content)
+    for name, entry in manifest.files.items():
+        check_file(out, name, entry, content=content)
     return manifest
 
 
@@ -66,27 +66,24 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     """
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
     marker = out / MARKER
-    try:
-        with locked(marker, wait=False) as file:
-            text = file.read()
-            if text:
-                _check_mark(marker, text, identity, engine)
-            else:
-                mark = {"identity": identity, "versions": versions(), "backend": engine}
-                file.write(json.dumps(mark).encode())
-                file.flush()
-                os.fsync(file.fileno())
-            try:
-                yield marker
-            except BaseException:
-                with suppress(OSError):
-                    if [entry.name for entry in out.iterdir()] == [MARKER]:
-                        marker.unlink()
-                        for folder in new:
-                            folder.rmdir()
-                raise
-    except BlockingIOError:
-        raise InputError(f"{out}: another run is writing this dataset") from None
+    with locked(marker, out) as file:
+        text = file.read()
+        if text:
+            _check_mark(marker, text, identity, engine)
+        else:
+            mark = {"identity": identity, "versions": versions(), "backend": engine}
+            file.write(json.dumps(mark).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        try:
+            yield marker
+        except BaseException:
+            with suppress(OSError):
+                if [entry.name for entry in out.iterdir()] == [MARKER]:
+                    marker.unlink()
+                    for folder in new:
+                        folder.rmdir()
+            raise
 
 
 def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:

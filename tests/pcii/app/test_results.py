@@ -24,7 +24,7 @@ from pcii.app.results import (
 from pcii.base.errors import InputError
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.folders import RESULTS, read_results
+from pcii.store.folders import RESULTS, RESULTS_FOLDER, read_results
 from pcii.store.manifests import DatasetManifest
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap, Segmented
@@ -134,7 +134,7 @@ def test_a_second_writer_is_refused_and_a_lock_that_was_left_is_no_obstacle(tmp_
     out, dataset = tmp_path / "out", dataset_of(tmp_path)
     (tmp_path / ".out.lock").touch()
     with writing(out, dataset) as folder:
-        assert "another command is writing" in one_sentence(lambda: save(out, dataset, 2), out)
+        assert "another run writes here" in one_sentence(lambda: save(out, dataset, 2), out)
         save_depth(folder, depth_of(1))
     assert z_of(out, dataset) == 1
 
@@ -158,7 +158,8 @@ def test_other_software_is_named_until_all_is_made_anew(saved: Path, tmp_path: P
     assert other_software(saved) == ""
     content = json.loads((saved / RESULTS).read_text())
     now, content["versions"]["numpy"] = content["versions"]["numpy"], "1.0"
-    (saved / RESULTS).write_text(json.dumps(content))
+    del content["sha256"]
+    RESULTS_FOLDER.write(saved, content)
     assert other_software(saved) == f"numpy 1.0 is now {now}"
     save(saved, dataset_of(tmp_path), 0.9)
     assert other_software(saved) == f"numpy 1.0, {now} is now {now}"

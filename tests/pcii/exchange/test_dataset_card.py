@@ -46,7 +46,7 @@ def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
     if make is make_collection:
         assert "`photons.budget` (2 values: 10.0, 20.0)" in text
     (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")
-    with pytest.raises(InputError, match=r"not listed in .*, and read by nothing"):
+    with pytest.raises(InputError, match="not listed in"):
         verify(root)
     write_card(root, TERMS)
     assert verify(root)

@@ -60,27 +60,20 @@ def test_datasets_are_opened_in_the_order_of_the_index(collection: Collection) -
     assert "40" in repr(collection)
 
 
-def test_datasets_are_found_by_any_value(collection: Collection) -> None:
-    assert len(collection.where(seed=2)) == 20
-    assert [row["path"] for row in collection.where(scene_number=7, seed=1).rows] == ["scene_7_seed_1"]
-    assert len(collection.where(budget=100)) == 40  # the last part of photons.budget
-    assert len(collection.where(lambda row: row["scene_number"] < 3)) == 6
-    with pytest.raises(InputError, match="no column 'sead'; there are path, scene"):
-        collection.where(sead=2)
-    with pytest.raises(
-        InputError, match=r"no dataset has split = 'tset'; there are \[train, validation, test\]"
-    ):
-        collection.where(split="tset")
-    assert len(collection.where(split="test", scene_number=0)) == 0
+def test_slices_and_masks_select_datasets(collection: Collection) -> None:
+    table = collection.table()
+    assert len(collection[table["seed"] == 2]) == 20
+    (row,) = collection[(table["scene_number"] == 7) & (table["seed"] == 1)].rows
+    assert row["path"] == "scene_7_seed_1"
+    for mask in ([True], [0.5] * 40, "train"):
+        with pytest.raises(InputError, match="collection: expected a number, a slice or 40 values"):
+            collection[mask]  # type: ignore[call-overload]
 
 
 def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None:
-    parts = {name: collection.where(split=name) for name in ("train", "validation", "test")}
-    assert [len(part) for part in parts.values()] == [32, 4, 4]
-    scenes = [{row["scene_number"] for row in part.rows} for part in parts.values()]
-    assert set.union(*scenes) == set(range(20))
-    assert sum(map(len, scenes)) == 20
-    assert {row["scene_number"] for row in parts["test"].rows} == {9, 19}
+    split = collection.table().groupby("split")["scene_number"]
+    assert split.count().to_dict() == {"train": 32, "validation": 4, "test": 4}
+    assert set(split.unique()["test"]) == {9, 19}
     shares = np.bincount([["train", "validation", "test"].index(split_of(n)) for n in range(1000)])
     assert list(shares) == [800, 100, 100]
 
@@ -90,11 +83,6 @@ def test_the_table_has_a_column_for_each_field(collection: Collection) -> None:
     names = ["path", "scene", "scene_number", "seed", "split", "photons", "photons.budget"]
     assert list(table.columns) == names
     assert table["seed"].tolist() == 20 * [1, 2]
-    assert table.groupby("split")["photons.budget"].count().to_dict() == {
-        "train": 32,
-        "validation": 4,
-        "test": 4,
-    }
 
 
 def forge_a_path(folder: Path) -> None:
@@ -129,7 +117,6 @@ def test_what_no_checksum_of_a_file_tells_is_refused(
 ) -> None:
     """Other damage is in test_verification.py."""
     harm(folder)
-    with pytest.raises(InputError, match=words):
-        verify(folder)
-    with pytest.raises(InputError, match=words):
-        open_collection(folder).where(scene_number=4, seed=1)[0]
+    for each in (verify, lambda path: open_collection(path)[8]):
+        with pytest.raises(InputError, match=words):
+            each(folder)

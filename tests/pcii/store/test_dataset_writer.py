@@ -179,7 +179,7 @@ SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
         (Views(LIGHT, GRID), {"photon_budget": 10}, "photon_budget: expected photons above 0, of images"),
         (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: expected two depths"),
         (COUNTED, {"title": 3}, "title: expected text, got int"),
-        (COUNTED, {"truth": Z_MM}, "truth: expected Truth, got ndarray"),
+        (COUNTED, {"truth": Z_MM}, "truth: expected a Truth"),
         (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected .* of \(4, 5\)"),
         (COUNTED, {"truth": Truth(Z_MM, IDS, MISKEYED)}, "objects.b: "),
         (COUNTED, {"truth": Truth(Z_MM, IDS, {1: "a", 10**9: "c"})}, "objects.1000000000: "),

@@ -5,30 +5,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from small_benchmark import REFERENCE_SCORES, SCENE, written
+from small_benchmark import SCENE, written
 
 import pcii
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.store.benchmark_layout import (
-    CERTIFICATE,
-    Definition,
-    compare,
-    differing_scores,
-    published_certificate,
-)
 from pcii.store.folders import hash_json
 from pcii.store.verification import verify
 from simgen.app.commands import app
 from simgen.dataset.benchmark_making import (
+    CERTIFICATE,
     BenchmarkSeries,
+    Definition,
     benchmark_files,
     certify,
+    compare,
     load_definition,
     make_benchmark,
-    reference_scores,
+    published_certificate,
 )
 
 pytestmark = pytest.mark.renders
@@ -50,7 +45,7 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
         *("pair_photons_1", "pair_photons_2", "pair_photons_3", "pair_frames_1", "pair_full-light"),
         *("wall_photons_1", "wall_photons_2", "wall_photons_3", "wall_full-light"),
     ]
-    assert len(collection.where(half="test")) == 4
+    assert len(collection[[row["values"]["half"] == "test" for row in collection.rows]]) == 4
     photons, frames, bright = collection[0], collection[3], collection[4]
     assert photons.budgets == (30, 1000, 3000)
     assert collection[1].budgets == (30, 1000)
@@ -80,10 +75,6 @@ def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Def
     assert "draws of the same light" in verdict.sentence()
     (problem,) = compare({"x": published["wall_photons_2"]}, {"x": first}).problems
     assert problem.startswith("x: its photons lie elsewhere")
-    bright = published["pair_full-light"]
-    brighter = dict(bright) | {"sha256": "", "light": (1.02 * np.array(bright["light"])).tolist()}
-    (problem,) = compare({"x": brighter}, {"x": bright}).problems
-    assert problem.startswith("x: its views have other light")
 
 
 @pytest.mark.parametrize(
@@ -91,7 +82,7 @@ def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Def
     [
         ({"seeds": []}, "seeds: expected at least one, each once"),
         ({"photons_per_view": [300, 30]}, "photons_per_view: expected growing numbers"),
-        ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "'a' is there twice"),
+        ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "scene: expected a name of its own"),
         ({"scene": [SCENE | {"name": "A B"}]}, r"scene\[0\]\.name"),
     ],
 )
@@ -127,19 +118,3 @@ def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves()
         is_brighter = recipe.seed == 1 and recipe.scene not in ("glass", "drawn_shiny")
         assert recipe.photons.budget == (100_000 if is_brighter else 10_000)
         assert recipe.grid.height == recipe.grid.width == 1024
-
-
-def test_scores_of_the_reference_method_are_compared_by_their_intervals(
-    made: tuple[Definition, Path, Path],
-) -> None:
-    assert published_certificate(made[1])["reference_scores"] == REFERENCE_SCORES  # nothing was published
-    published = reference_scores(made[2], ["development"])
-    assert published.keys() == {"pair"}
-    pair = published["pair"]
-    assert pair["interval"][0] <= pair["mean"] <= pair["interval"][1]
-    assert differing_scores(published, published) == []
-    width = pair["interval"][1] - pair["interval"][0]
-    other = published | {"pair": {"mean": 0.0, "interval": [end + 1.1 * width for end in pair["interval"]]}}
-    (problem,) = differing_scores(other, published)
-    assert problem.startswith("pair: the method 'brightness' has an IoU of 0.000 instead of ")
-    assert differing_scores({}, published) == []

@@ -168,10 +168,10 @@ def test_verification_says_what_is_unfinished_and_what_belongs_to_nothing(
     shutil.copytree(collection, out)
     (out / "budget_100_seed_10").mkdir()
     (out / "budget_100_seed_10" / MARKER).write_text("{}")
-    with pytest.raises(InputError, match=r"not finished: budget_100_seed_10; the same .* goes on with them"):
+    with pytest.raises(InputError, match=r"not listed in index.jsonl: budget_100_seed_10; repeat"):
         verify(out)
     (out / "mine").mkdir()
-    with pytest.raises(InputError, match=r"not listed in index.jsonl, and read by nothing: mine; move it"):
+    with pytest.raises(InputError, match=r"not listed in index.jsonl: budget_100_seed_10, mine;"):
         verify(out)
 
 
