@@ -123,7 +123,7 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
 @contextmanager
 def _only_writer(lock: Path, out: Path) -> Iterator[None]:
     try:
-        with locked(lock, wait=False):
+        with locked(lock):
             try:
                 yield
             finally:

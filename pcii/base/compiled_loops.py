@@ -1,9 +1,9 @@
 """Compilation of loops with Numba, which needs no system library, and their threads.
 
 Modules of loops are imported where a loop is about to run, since importing Numba takes longer than the rest
-of the package. Compiled code is cached on disk, so each loop is compiled once per machine, which is announced
-(`progress`). Threads share loops by ranges of their outermost index: Numba's own parallel loops take twice as
-long to compile, and their OpenMP threads do not survive a fork.
+of the package. Compiled code is cached on disk, so each loop is compiled once per machine. Threads share
+loops by ranges of their outermost index: Numba's own parallel loops take twice as long to compile, and their
+OpenMP threads do not survive a fork.
 """
 
 import os
@@ -13,10 +13,8 @@ from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numba as nb
-from numba.core import event
 
 from pcii.base.executor import threads_of_worker
-from pcii.base.progress import report_compiling
 
 compiled = nb.njit(nogil=True, cache=True)
 """Decorator of a compiled function."""
@@ -113,25 +111,3 @@ def _forget_pool() -> None:
 
 
 os.register_at_fork(after_in_child=_forget_pool)  # a pool's threads stay behind in the parent
-
-
-class _CompilingListener(event.Listener):
-    """Reports each loop that Numba compiles; loops read from the cache are not reported."""
-
-    def __init__(self) -> None:
-        self.loops, self.nested = 0, 0
-
-    def on_start(self, event: event.Event) -> None:
-        self.nested += 1
-        if self.nested == 1:  # a nested compilation is part of the outer one
-            self.loops += 1
-            module: str = event.data["dispatcher"].py_func.__module__  # type: ignore[index]
-            report_compiling(self.loops, running=True, own=module.startswith("pcii."))
-
-    def on_end(self, event: event.Event) -> None:
-        self.nested -= 1
-        if self.nested == 0:
-            report_compiling(self.loops, running=False, own=False)
-
-
-event.register("numba:compile", _CompilingListener())

@@ -1,10 +1,7 @@
-"""Display of text from untrusted files: markup is escaped, invisible characters are made visible."""
+"""Display of text from untrusted files: Markdown is escaped, invisible characters are made visible."""
 
-import json
 import re
 from html import escape
-from typing import Any
-from urllib.parse import quote
 
 UNSEEN = re.compile(
     "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
@@ -12,8 +9,6 @@ UNSEEN = re.compile(
 """Control characters, ends of lines, marks of writing direction, surrogates, and what is no character."""
 MARKDOWN = re.compile(r"[\\`*\[\]|~$#]|(?<![^\W_])_|_(?![^\W_])")
 """Characters with a meaning in Markdown; an underscore has one only at the ends of words."""
-OF_ADDRESSES = "%/:?#[]@!$&'()*+,;=~"
-"""What addresses of the web hold beside letters, digits and - . _ as it is."""
 
 
 def visible(text: str) -> str:
@@ -35,25 +30,6 @@ def in_terminal(text: str) -> str:
     return "\n".join(map(visible, text.split("\n")))
 
 
-def in_json(value: Any, indent: int | None = None) -> str:
-    """JSON of a value, of characters that terminals show and YAML takes; `ValueError` for NaN and infinities.
-
-    >>> print(in_json("caf\u00e9" + chr(0x9b)))
-    "caf\u00e9\\u009b"
-    """
-    text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
-    return "\n".join(UNSEEN.sub(lambda match: f"\\u{ord(match[0]):04x}", line) for line in text.split("\n"))
-
-
-def in_html(value: object) -> str:
-    """The text of a value, escaped for the content or a quoted attribute of an HTML element.
-
-    >>> in_html("<b>")
-    '&lt;b&gt;'
-    """
-    return escape(visible(str(value)))
-
-
 def in_markdown(text: str) -> str:
     """The text, escaped so that Markdown shows it literally, in tables too.
 
@@ -61,14 +37,3 @@ def in_markdown(text: str) -> str:
     a\\|b, snake_case, \\*c\\*
     """
     return MARKDOWN.sub(r"\\\g<0>", escape(visible(text), quote=False))
-
-
-def web_address(text: str) -> str:
-    """An address of the web as a link takes it, other characters percent-encoded; "" for any other text.
-
-    >>> web_address("https://example.org/a b"), web_address("javascript://x")
-    ('https://example.org/a%20b', '')
-    """
-    if not re.match("https?://", text, re.IGNORECASE):
-        return ""
-    return quote(text, safe=OF_ADDRESSES, errors="backslashreplace")

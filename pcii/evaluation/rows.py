@@ -121,7 +121,7 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
     EVALUATION_FOLDER.guard(out)
     out.mkdir(parents=True, exist_ok=True)
     try:
-        with locked(out / ROWS, wait=False) as file:
+        with locked(out / ROWS) as file:
             content = file.read()
             file.truncate(content.rfind(b"\n") + 1)
             yield RowFile(file, _parsed(out, content))

@@ -3,15 +3,16 @@
 It depends on the data and the terms alone, and no manifest lists it: other terms make no other dataset.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pcii.base.plain_text import in_json, in_markdown, web_address
-from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
-from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
-from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
+from pcii.base.plain_text import in_markdown
+from pcii.base.safe_files import temporaries_of, write_bytes_safely
+from pcii.store.collection import is_collection, read_collection, read_index
+from pcii.store.dataset_layout import CARD, read_manifest
 
 PROJECT = "photon-integral-imaging"
 LICENCE = "BSD-3-Clause"
@@ -61,10 +62,9 @@ def write_card(root: Path, terms: Terms) -> None:
         is_written = present == content and not temporaries_of(root, CARD)
         if is_written or INSTALL.encode() not in present:
             return
-    with locked(root / (COLLECTION if is_collection(root) else MANIFEST), wait=True):
-        for temporary in temporaries_of(root, CARD):
-            temporary.unlink()
-        write_bytes_safely(file, content)
+    for temporary in temporaries_of(root, CARD):
+        temporary.unlink()
+    write_bytes_safely(file, content)
 
 
 def _of_dataset(root: Path) -> list[str]:
@@ -101,19 +101,15 @@ def _of_collection(root: Path) -> list[str]:
 
 def _values_of(field: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """The values of a field, some of them where there are many."""
-    values = list(dict.fromkeys(in_json(row["values"][field]) for row in rows))
+    values = list(dict.fromkeys(json.dumps(row["values"][field], ensure_ascii=False) for row in rows))
     shown = values if len(values) <= 6 else [*values[:3], "...", values[-1]]
     return f"`{field}` ({len(values)} values: {', '.join(in_markdown(value) for value in shown)})"
 
 
 def _terms(terms: Terms) -> list[str]:
-    licence = in_markdown(terms.licence)
-    is_address = "://" in terms.licence
-    link = web_address(terms.licence if is_address else f"https://spdx.org/licenses/{terms.licence}.html")
-    address = web_address(terms.url)
     return [
-        f"Licence: {f'[{licence}](<{link}>)' if link else licence}. "
+        f"Licence: {in_markdown(terms.licence)}. "
         f"By {', '.join(in_markdown(name) for name in terms.creators)}. Please cite:",
         f"> {in_markdown(terms.citation)}",
-        f"Where: {f'<{address}>' if address else in_markdown(terms.url)}" if terms.url else "",
+        f"Where: {in_markdown(terms.url)}" if terms.url else "",
     ]

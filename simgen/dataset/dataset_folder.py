@@ -67,7 +67,7 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
     marker = out / MARKER
     try:
-        with locked(marker, wait=False) as file:
+        with locked(marker) as file:
             text = file.read()
             if text:
                 _check_mark(marker, text, identity, engine)
