@@ -122,14 +122,11 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
 
 @contextmanager
 def _only_writer(lock: Path, out: Path) -> Iterator[None]:
-    try:
-        with locked(lock):
-            try:
-                yield
-            finally:
-                lock.unlink(missing_ok=True)
-    except BlockingIOError:
-        raise InputError(f"{out}: another command is writing results there; wait for its end") from None
+    with locked(lock, out):
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
 
 
 def _origin(dataset: Dataset) -> dict[str, Any]:

@@ -6,7 +6,7 @@ errors            Exceptions whose sentence is all that a command prints of them
 executor          Where the pieces of work are done: in this process, in local worker processes, or on a
                   Dask cluster.
 extensions        Functions of others: entry points of installed packages, module:function, file.py:function.
-plain_text        Display of text from untrusted files: Markdown is escaped, invisible characters are made
+plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
                   visible.
 progress          Progress of long work: bars on a terminal, plain lines in a log.
 safe_files        Atomic writing of files and folders: whatever has its final name is complete.

@@ -9,7 +9,7 @@ OpenMP threads do not survive a fork.
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numba as nb
@@ -29,7 +29,6 @@ PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
 _threads: int | None = None
-_pool: ThreadPoolExecutor | None = None
 
 
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
@@ -54,7 +53,7 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
         for place in waiting:
             results[place] = function(items[place])
 
-    others = [_thread_pool().submit(work) for _ in range(min(threads(), len(items)) - 1)]
+    others = [_thread_pool(threads()).submit(work) for _ in range(min(threads(), len(items)) - 1)]
     work()
     for other in others:
         if not other.cancel():  # it had not begun: all is done
@@ -89,7 +88,6 @@ def use_threads(count: int) -> None:
     """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
     global _threads
     _threads = count
-    _forget_pool()
 
 
 def threads() -> int:
@@ -98,16 +96,9 @@ def threads() -> int:
     return min(_threads or threads_of_worker() or allowed, allowed)
 
 
-def _thread_pool() -> ThreadPoolExecutor:
-    global _pool
-    if _pool is None:
-        _pool = ThreadPoolExecutor(threads() - 1, "loops")
-    return _pool
+@cache
+def _thread_pool(count: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(count, "loops")
 
 
-def _forget_pool() -> None:
-    global _pool
-    _pool = None
-
-
-os.register_at_fork(after_in_child=_forget_pool)  # a pool's threads stay behind in the parent
+os.register_at_fork(after_in_child=_thread_pool.cache_clear)  # a pool's threads stay behind in the parent

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from pcii.base.errors import InputError
+
 
 def write_bytes_safely(path: Path, content: bytes) -> None:
     """Write a file so that it is complete or, if interrupted, keeps its former content."""
@@ -120,17 +122,22 @@ def named_in_errors(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[IO[bytes]]:
+def locked(path: Path, folder: Path) -> Iterator[IO[bytes]]:
     """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
-    The holder of the lock may delete the file. Raises BlockingIOError if another process holds it.
+    The holder of the lock may delete the file. Raises `InputError`, of the folder that is written to, if
+    another process holds it.
     """
     import fcntl  # not available on every system, and needed by writers only
 
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a+b") as file:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if not path.exists() or not os.path.samestat(os.fstat(file.fileno()), path.stat()):
-            raise BlockingIOError  # the last holder has just deleted it
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_held = os.path.samestat(os.fstat(file.fileno()), path.stat())
+        except (BlockingIOError, FileNotFoundError):  # or its holder has deleted it meanwhile
+            is_held = False
+        if not is_held:
+            raise InputError(f"{folder}: another run writes here; wait for its end")
         file.seek(0)
         yield file

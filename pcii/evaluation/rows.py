@@ -120,13 +120,10 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
     """
     EVALUATION_FOLDER.guard(out)
     out.mkdir(parents=True, exist_ok=True)
-    try:
-        with locked(out / ROWS) as file:
-            content = file.read()
-            file.truncate(content.rfind(b"\n") + 1)
-            yield RowFile(file, _parsed(out, content))
-    except BlockingIOError:
-        raise InputError(f"{out}: another run writes here; wait for it, or name another folder") from None
+    with locked(out / ROWS, out) as file:
+        content = file.read()
+        file.truncate(content.rfind(b"\n") + 1)
+        yield RowFile(file, _parsed(out, content))
 
 
 def read_rows(out: Path) -> list[Row]:

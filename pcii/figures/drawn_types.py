@@ -7,13 +7,12 @@ takes from a value to the drawing of plain arrays.
 import base64
 import io
 from collections.abc import Callable
-from html import escape
 from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
+from pcii.base.plain_text import in_html
 from pcii.figures import plots
 from pcii.figures.panels import Style
 
@@ -29,7 +28,7 @@ def picture_html(value: Any) -> str:
     """The line of a value and its drawing, in HTML; without a picture if its data cannot be read."""
     from matplotlib import pyplot
 
-    line, png = f"<pre>{escape(visible(repr(value)))}</pre>", io.BytesIO()
+    line, png = f"<pre>{in_html(repr(value))}</pre>", io.BytesIO()
     try:
         figure = draw(value)[0].figure
     except (InputError, OSError):

@@ -111,14 +111,11 @@ def _claim(out: Path) -> Iterator[None]:
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
     COLLECTION_FOLDER.guard(out)
-    try:
-        with locked(out / LOCK):
-            try:
-                yield
-            finally:
-                (out / LOCK).unlink(missing_ok=True)
-    except BlockingIOError:
-        raise InputError(f"{out}: another run is writing this collection") from None
+    with locked(out / LOCK, out):
+        try:
+            yield
+        finally:
+            (out / LOCK).unlink(missing_ok=True)
 
 
 def _begin(series: Series, out: Path) -> None:

@@ -66,27 +66,24 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     """
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
     marker = out / MARKER
-    try:
-        with locked(marker) as file:
-            text = file.read()
-            if text:
-                _check_mark(marker, text, identity, engine)
-            else:
-                mark = {"identity": identity, "versions": versions(), "backend": engine}
-                file.write(json.dumps(mark).encode())
-                file.flush()
-                os.fsync(file.fileno())
-            try:
-                yield marker
-            except BaseException:
-                with suppress(OSError):
-                    if [entry.name for entry in out.iterdir()] == [MARKER]:
-                        marker.unlink()
-                        for folder in new:
-                            folder.rmdir()
-                raise
-    except BlockingIOError:
-        raise InputError(f"{out}: another run is writing this dataset") from None
+    with locked(marker, out) as file:
+        text = file.read()
+        if text:
+            _check_mark(marker, text, identity, engine)
+        else:
+            mark = {"identity": identity, "versions": versions(), "backend": engine}
+            file.write(json.dumps(mark).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        try:
+            yield marker
+        except BaseException:
+            with suppress(OSError):
+                if [entry.name for entry in out.iterdir()] == [MARKER]:
+                    marker.unlink()
+                    for folder in new:
+                        folder.rmdir()
+            raise
 
 
 def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:

@@ -134,7 +134,7 @@ def test_a_second_writer_is_refused_and_a_lock_that_was_left_is_no_obstacle(tmp_
     out, dataset = tmp_path / "out", dataset_of(tmp_path)
     (tmp_path / ".out.lock").touch()
     with writing(out, dataset) as folder:
-        assert "another command is writing" in one_sentence(lambda: save(out, dataset, 2), out)
+        assert "another run writes here" in one_sentence(lambda: save(out, dataset, 2), out)
         save_depth(folder, depth_of(1))
     assert z_of(out, dataset) == 1
 

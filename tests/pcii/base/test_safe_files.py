@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from stored_datasets import DENSE, make_dataset
 
+import pcii
 from pcii.base.safe_files import (
     locked,
     new_folder_safely,
@@ -104,12 +105,12 @@ def test_a_folder_that_cannot_be_replaced_stays(tmp_path, monkeypatch):
 
 def test_one_writer_at_a_time(tmp_path):
     path = tmp_path / "new" / "lock"
-    second = locked(path)
-    with locked(path), pytest.raises(BlockingIOError):
+    second = locked(path, tmp_path)
+    with locked(path, tmp_path), pytest.raises(pcii.InputError, match="another run writes here"):
         second.__enter__()
-    with locked(path):
+    with locked(path, tmp_path):
         path.unlink()  # as its holder may
-    with locked(path) as file:
+    with locked(path, tmp_path) as file:
         assert os.path.samestat(os.fstat(file.fileno()), path.stat())
 
 
@@ -121,5 +122,5 @@ def test_a_lock_that_its_holder_deleted_meanwhile_is_not_held(tmp_path, monkeypa
         flock(file, kind)
 
     monkeypatch.setattr(fcntl, "flock", delete_first)
-    with pytest.raises(BlockingIOError):
-        locked(path).__enter__()
+    with pytest.raises(pcii.InputError, match="another run writes here"):
+        locked(path, tmp_path).__enter__()

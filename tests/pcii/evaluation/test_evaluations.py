@@ -304,7 +304,7 @@ def test_a_run_that_fails_keeps_what_it_measured_and_a_second_one_is_refused(
     out = tmp_path / "out"
 
     def breaks(counts: Any, sections: Any) -> Any:
-        with pytest.raises(InputError, match="out: another run writes here; wait for it, or name another"):
+        with pytest.raises(InputError, match="out: another run writes here; wait for its end"):
             evaluate([series], out, methods=["variance"])
         if counts.total == open_dataset(series / "seed_5").counts.total:
             raise InputError("this photon is one too many")

@@ -157,7 +157,7 @@ def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with (tmp_path / "out" / MARKER).open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        with pytest.raises(InputError, match="another run is writing"):
+        with pytest.raises(InputError, match="another run writes here"):
             generate(recipe(), Path(), tmp_path / "out")
 
 

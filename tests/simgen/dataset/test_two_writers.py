@@ -51,7 +51,7 @@ def test_of_two_on_one_dataset_one_is_refused_at_once(
         one, other = sorted([first.end(), second.end()])
         assert (one.code, other.code) == (0, 2)
         assert other.seconds < REFUSED_WITHIN_S
-        sentence = f"error: {out}: another run is writing this dataset"
+        sentence = f"error: {out}: another run writes here; wait for its end"
         assert other.error.splitlines()[-1] == sentence
         assert digest(out) == digest(alone)
         assert verify(out) == verify(alone)
@@ -72,6 +72,6 @@ def test_of_two_on_one_collection_one_is_refused_at_once(
     one, other = [writer.end() for writer in writers]
     assert (one.code, other.code) == (0, 2)
     assert other.seconds < REFUSED_WITHIN_S
-    assert other.error.splitlines()[-1] == f"error: {out}: another run is writing this collection"
+    assert other.error.splitlines()[-1] == f"error: {out}: another run writes here; wait for its end"
     assert len(open_collection(out)) == 5
     assert verify(out) > 5
