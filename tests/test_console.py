@@ -14,7 +14,7 @@ from property_settings import mostly_slow
 from pcii.app import commands as pcii_cli
 from pcii.app.command_options import depths_mm
 from pcii.base import command_line
-from pcii.base.command_line import answer_json, command_app, say
+from pcii.base.command_line import answer_json, command_app, say, say_next
 from pcii.base.plain_text import UNSEEN
 from pcii.base.progress import Stages
 from pcii.store.dataset import SAMPLE
@@ -141,3 +141,18 @@ def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.Ca
         printed = capsys.readouterr()
         assert not UNSEEN.search((printed.out + printed.err).replace("\n", ""))
         assert json.JSONDecoder().raw_decode(printed.out)[0] == {name: 1}
+
+
+def test_a_terminal_has_bars_and_the_command_to_type_next(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True)
+    with Stages() as report:
+        for done in (0, 2):
+            report("[red] rows", done, 3)
+    say_next("pcii", "run", "a file")
+    printed = capsys.readouterr()
+    assert "[red] rows" in printed.err
+    assert "2/3" in printed.err
+    assert printed.out == "next:  pcii run 'a file'\n"

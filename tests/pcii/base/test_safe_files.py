@@ -1,7 +1,6 @@
 """Writing that survives a kill, and locks."""
 
 import fcntl
-import json
 import os
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from pcii.base.safe_files import (
     replace_folder,
     sweep_temporaries,
     write_bytes_safely,
-    write_json_safely,
 )
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import COUNTS, RADIANCE
@@ -42,15 +40,6 @@ def test_a_failed_write_leaves_the_old_content_and_no_temporary(tmp_path, monkey
         write_bytes_safely(path, b"new")
     assert path.read_bytes() == b"old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.bin"]
-
-
-@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_json_refuses_what_json_cannot_say_and_keeps_the_old_file(tmp_path, bad):
-    path = tmp_path / "a.json"
-    write_json_safely(path, {"z_mm": 540})
-    with pytest.raises(ValueError, match=r"JSON compliant"):
-        write_json_safely(path, {"z_mm": bad})
-    assert json.loads(path.read_text()) == {"z_mm": 540}
 
 
 def test_a_killed_runs_scraps_are_swept_and_the_rest_is_kept(tmp_path):
