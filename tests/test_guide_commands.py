@@ -11,7 +11,7 @@ from guide_blocks import APPS, PAGES, SHELL_SIGNS, blocks, words
 
 INLINE = re.compile(r"(?<!`)`((?:simgen|pcii) [^`]+)`(?!`)")
 LINK = re.compile(r"\]\((?!https?://)([^)#\s]+)")
-COMMON = {"-q", "--quiet", "--help"}
+COMMON = {"--help"}
 """Options that every command has, and that its own parser does not know."""
 by_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.name))
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
-from pcii.base.command_line import answer, results_folder, say, say_next
+from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.exchange.camera_fit import CameraFit, check_grid
@@ -151,10 +151,10 @@ def import_dataset(
     sensor = "mono" if dataset.cfa is None else f"{dataset.cfa} Bayer pattern"
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
-        (answer if note.startswith("warning") else say)(note)
+        say(note)
     advice = None if imported.states_cameras else _advice(fit, order, lenses)
     if advice is not None:
-        answer(f"warning: {advice}; then delete {out} and import again")
+        say(f"warning: {advice}; then delete {out} and import again")
         return
     _say_depths(fit)
     say_next("pcii", "run", out, "-o", results_folder(out))

@@ -17,7 +17,7 @@ from pcii.app.command_options import (
     dataset_at,
 )
 from pcii.app.pipeline import full_light_sections
-from pcii.base.command_line import answer, answer_json, say, say_next, say_next_page
+from pcii.base.command_line import answer_json, say, say_next, say_next_page
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
@@ -237,7 +237,7 @@ def _warn_of_few_depths(depth_map: DepthMap, data: Dataset) -> None:
         reason = f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
     else:
         reason = "the views show too little texture"
-    answer(f"warning: {share:.1%} of the pixels have a depth, most likely since {reason}")
+    say(f"warning: {share:.1%} of the pixels have a depth, most likely since {reason}")
 
 
 def _say_next_score(data: Dataset, out: Path) -> None:

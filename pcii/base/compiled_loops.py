@@ -1,22 +1,20 @@
 """Compilation of loops with Numba, which needs no system library, and their threads.
 
 Modules of loops are imported where a loop is about to run, since importing Numba takes longer than the rest
-of the package. Compiled code is cached on disk, so each loop is compiled once per machine, which is announced
-(`progress`). Threads share loops by ranges of their outermost index: Numba's own parallel loops take twice as
-long to compile, and their OpenMP threads do not survive a fork.
+of the package. Compiled code is cached on disk, so each loop is compiled once per machine. Threads share
+loops by ranges of their outermost index: Numba's own parallel loops take twice as long to compile, and their
+OpenMP threads do not survive a fork.
 """
 
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numba as nb
-from numba.core import event
 
 from pcii.base.executor import threads_of_worker
-from pcii.base.progress import report_compiling
 
 compiled = nb.njit(nogil=True, cache=True)
 """Decorator of a compiled function."""
@@ -31,7 +29,6 @@ PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
 _threads: int | None = None
-_pool: ThreadPoolExecutor | None = None
 
 
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
@@ -56,7 +53,7 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
         for place in waiting:
             results[place] = function(items[place])
 
-    others = [_thread_pool().submit(work) for _ in range(min(threads(), len(items)) - 1)]
+    others = [_thread_pool(threads()).submit(work) for _ in range(min(threads(), len(items)) - 1)]
     work()
     for other in others:
         if not other.cancel():  # it had not begun: all is done
@@ -91,7 +88,6 @@ def use_threads(count: int) -> None:
     """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
     global _threads
     _threads = count
-    _forget_pool()
 
 
 def threads() -> int:
@@ -100,38 +96,9 @@ def threads() -> int:
     return min(_threads or threads_of_worker() or allowed, allowed)
 
 
-def _thread_pool() -> ThreadPoolExecutor:
-    global _pool
-    if _pool is None:
-        _pool = ThreadPoolExecutor(threads() - 1, "loops")
-    return _pool
+@cache
+def _thread_pool(count: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(count, "loops")
 
 
-def _forget_pool() -> None:
-    global _pool
-    _pool = None
-
-
-os.register_at_fork(after_in_child=_forget_pool)  # a pool's threads stay behind in the parent
-
-
-class _CompilingListener(event.Listener):
-    """Reports each loop that Numba compiles; loops read from the cache are not reported."""
-
-    def __init__(self) -> None:
-        self.loops, self.nested = 0, 0
-
-    def on_start(self, event: event.Event) -> None:
-        self.nested += 1
-        if self.nested == 1:  # a nested compilation is part of the outer one
-            self.loops += 1
-            module: str = event.data["dispatcher"].py_func.__module__  # type: ignore[index]
-            report_compiling(self.loops, running=True, own=module.startswith("pcii."))
-
-    def on_end(self, event: event.Event) -> None:
-        self.nested -= 1
-        if self.nested == 0:
-            report_compiling(self.loops, running=False, own=False)
-
-
-event.register("numba:compile", _CompilingListener())
+os.register_at_fork(after_in_child=_thread_pool.cache_clear)  # a pool's threads stay behind in the parent

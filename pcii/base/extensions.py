@@ -46,7 +46,7 @@ class MethodRegistry:
         Raises `InputError`, which lists the known names, if there is no such `noun` among those `offered`.
         """
         known = self.built_in if offered is None else offered
-        if isinstance(method, str) and ":" in method and method not in known:
+        if isinstance(method, str) and ":" in method:
             method = load_function(method)
         if callable(method):
             return self.checked(method, f"method: {name_of(method)!r}", None)
@@ -69,12 +69,12 @@ def registered(group: str, taken: Collection[str]) -> dict[str, "EntryPoint"]:
 
     points: dict[str, EntryPoint] = {}
     for point in sorted(entry_points(group=group), key=lambda point: point.name):
-        label = f"{group}: {point.value} of {package_of(point)}"
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", point.name):
-            raise InputError(f"{label} is named {point.name!r}; use letters, digits, '-', '_' and '.'")
-        other = points.get(point.name)
-        if point.name in taken or (other is not None and other.value != point.value):
-            raise InputError(f"{label} needs another name than {point.name!r}, which is taken")
+        is_new = point.name not in taken and point.name not in points
+        if not is_new or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", point.name):
+            raise InputError(
+                f"{group}: {point.value} of {package_of(point)} needs another name than {point.name!r}: "
+                "one that is not taken, of letters, digits, '-', '_' and '.'"
+            )
         points[point.name] = point
     return points
 
@@ -105,8 +105,7 @@ def _loaded(load: Callable[[], Any], label: str) -> Function:
     try:
         function = load()
     except (Exception, SystemExit) as fault:  # importing another package's module may raise anything
-        kind = "" if isinstance(fault, InputError) else f"{type(fault).__name__}: "
-        raise InputError(f"{label} cannot be loaded: {kind}{fault}") from fault
+        raise InputError(f"{label} cannot be loaded: {type(fault).__name__}: {fault}") from fault
     if not callable(function):
         raise InputError(f"{label} is {type(function).__name__}, which cannot be called")
     return function

@@ -1,9 +1,7 @@
 """Display of text from untrusted files: markup is escaped, invisible characters are made visible."""
 
-import json
 import re
 from html import escape
-from typing import Any
 from urllib.parse import quote
 
 UNSEEN = re.compile(
@@ -33,16 +31,6 @@ def in_terminal(text: str) -> str:
     lines\\x1b[2J
     """
     return "\n".join(map(visible, text.split("\n")))
-
-
-def in_json(value: Any, indent: int | None = None) -> str:
-    """JSON of a value, of characters that terminals show and YAML takes; `ValueError` for NaN and infinities.
-
-    >>> print(in_json("caf\u00e9" + chr(0x9b)))
-    "caf\u00e9\\u009b"
-    """
-    text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
-    return "\n".join(UNSEEN.sub(lambda match: f"\\u{ord(match[0]):04x}", line) for line in text.split("\n"))
 
 
 def in_html(value: object) -> str:

@@ -7,8 +7,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -29,23 +29,7 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
-
-
-def add_files_safely(folder: Path, contents: Mapping[str, bytes], *, overwrite: bool) -> None:
-    """Write files of these names and contents into a folder, new or not, each safely.
-
-    A file that is there with other content is refused by `InputError` before anything is written, unless
-    `overwrite`.
-    """
-    new = {folder / name: content for name, content in contents.items()}
-    for path, content in new.items():
-        if path.is_dir() or (path.exists() and not overwrite and path.read_bytes() != content):
-            raise InputError(
-                f"{path}: is there with other content; name another folder, or give overwrite=True"
-            )
-    for path, content in new.items():
-        write_bytes_safely(path, content)
+    _sync_folder(path.parent)
 
 
 def json_bytes(value: Any) -> bytes:
@@ -99,10 +83,10 @@ def replace_folder(new: Path, folder: Path) -> None:
             if replaces:
                 old.replace(folder)
             raise
-        sync_folder(folder.parent)
+        _sync_folder(folder.parent)
 
 
-def sync_folder(folder: Path) -> None:
+def _sync_folder(folder: Path) -> None:
     """Flush a folder's entries (new names, renames) to disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -112,9 +96,9 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def temporaries_of(folder: Path, *names: str) -> list[Path]:
-    """Temporary files of these files that killed processes left in the folder."""
-    return [left for name in names for left in folder.glob(f".{name}.*.tmp")]
+def temporaries_of(folder: Path, name: str) -> list[Path]:
+    """Temporary files of this file that killed processes left in the folder."""
+    return list(folder.glob(f".{name}.*.tmp"))
 
 
 def sweep_temporaries(root: Path) -> None:
@@ -141,29 +125,19 @@ def named_in_errors(path: Path) -> Iterator[None]:
 def locked(path: Path, folder: Path) -> Iterator[IO[bytes]]:
     """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
-    The holder of the lock may delete the file, and its folder. Raises `InputError`, of the folder that is
-    written to, if another process holds it.
+    The holder of the lock may delete the file. Raises `InputError`, of the folder that is written to, if
+    another process holds it.
     """
     import fcntl  # not available on every system, and needed by writers only
 
-    while True:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a+b") as file:
         try:
-            opened = path.open("a+b")
-        except FileNotFoundError:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            continue
-        with opened as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise InputError(f"{folder}: another run writes here; wait for its end") from None
-            if _is_file_at(path, file):  # else the last holder has deleted it meanwhile
-                file.seek(0)
-                yield file
-                return
-
-
-def _is_file_at(path: Path, file: IO[bytes]) -> bool:
-    with suppress(FileNotFoundError):
-        return os.path.samestat(os.fstat(file.fileno()), path.stat())
-    return False
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_held = os.path.samestat(os.fstat(file.fileno()), path.stat())
+        except (BlockingIOError, FileNotFoundError):  # or its holder has deleted it meanwhile
+            is_held = False
+        if not is_held:
+            raise InputError(f"{folder}: another run writes here; wait for its end")
+        file.seek(0)
+        yield file

@@ -51,7 +51,7 @@ def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Rep
                 methods_by_change.setdefault(change, []).append(task.method.name)
     if len(pieces) < len(tasks):
         report("scores of an earlier run", len(tasks) - len(pieces), len(tasks) - len(pieces))
-    with closing(executor.run(job, pieces, report)) as results:
+    with closing(executor.run(job, pieces)) as results:
         for done, (_, row) in enumerate(results, start=1):
             file.add(row)
             report("scores", done, len(pieces))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from pcii.base import command_line
-from pcii.base.command_line import answer, answer_json, complain_of, results_folder, say, say_next
+from pcii.base.command_line import answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.store.collection import Half
@@ -66,12 +66,12 @@ def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
         survey = [asdict(candidate) for candidate in candidates]
         answer_json({"chosen": asdict(chosen), "candidates": survey, "advice": advice})
     else:
-        answer(f"Rendering will run with {chosen.line()}")
+        say(f"Rendering will run with {chosen.line()}")
         for candidate in candidates:
             mark = "works" if candidate.works else "no"
-            answer(f"  {mark:5}  {candidate.kind:6}  {candidate.library or '-'}: {candidate.detail}")
+            say(f"  {mark:5}  {candidate.kind:6}  {candidate.library or '-'}: {candidate.detail}")
         if advice:
-            answer(advice)
+            say(advice)
         say_next("simgen", "scenes")
     if require_compiled and chosen.kind == "scalar":
         raise RuntimeError("no compiled backend works here")

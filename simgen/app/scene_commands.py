@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base.command_line import answer, answer_json, say, say_next
+from pcii.base.command_line import answer_json, say, say_next
 
 Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
@@ -34,7 +34,7 @@ def scenes() -> None:
     from simgen.app.starting_points import list_recipes, list_scenes
 
     for line in (*list_scenes(), "", "Recipes, of which `simgen generate` makes datasets:", *list_recipes()):
-        answer(line)
+        say(line)
     say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")
 
 
@@ -92,10 +92,10 @@ def check(
     if json:
         answer_json([asdict(finding) for finding in findings])
     else:
-        answer(line)
+        say(line)
         for finding in findings:
-            answer(finding.line())
-        answer(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
+            say(finding.line())
+        say(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
         if not bad:
             number = [] if scene is None else ["--scene", scene]
             values = [f"--set={text}" for text in set]

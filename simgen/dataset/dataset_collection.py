@@ -68,7 +68,7 @@ def generate_collection(
         _begin(series, out)
         report("datasets", 0, len(pieces))
         try:
-            with closing(executor.run(DatasetJob(series, out), pieces, report)) as results:
+            with closing(executor.run(DatasetJob(series, out), pieces)) as results:
                 for _, result in results:
                     if isinstance(result, str):
                         faults.append(result)
@@ -123,7 +123,7 @@ def _begin(series: Series, out: Path) -> None:
 
     Other values of the swept fields may be there already; a collection without any dataset gives way.
     """
-    for temporary in temporaries_of(out, INDEX, COLLECTION):
+    for temporary in [*temporaries_of(out, INDEX), *temporaries_of(out, COLLECTION)]:
         temporary.unlink()
     document = {
         "fields": list(series.fields),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import add_files_safely
+from pcii.base.safe_files import write_bytes_safely
 from pcii.store.folders import entries
 from simgen.base.file_lookup import AssetName, asset, named_files
 from simgen.base.strict_models import (
@@ -215,8 +215,18 @@ class Scene(Strict):
         if len(text) > LARGEST_TOML_BYTES:
             raise InputError(f"{out}: a scene.toml may have {LARGEST_TOML_BYTES} bytes, and this has more")
         source = checked_folder(self)
-        files = {name: asset(source, name, where).read_bytes() for where, name in scene_files(self)}
-        add_files_safely(out, {**files, "scene.toml": text}, overwrite=overwrite)
+        files = {out / name: asset(source, name, where).read_bytes() for where, name in scene_files(self)}
+        files[out / "scene.toml"] = text
+        changes = {
+            path: content
+            for path, content in files.items()
+            if not path.is_file() or path.read_bytes() != content
+        }
+        for path in changes:
+            if path.is_dir() or (path.exists() and not overwrite):
+                raise InputError(f"{path}: is there with other content; give overwrite=True")
+        for path, content in changes.items():
+            write_bytes_safely(path, content)
         return out / "scene.toml"
 
 

@@ -108,7 +108,7 @@ app = command_line.command_app("numbers", "Numbers.")
 def work(folder: Path, scheduler: str | None = None):
     work, executor = Numbers(folder, seconds=float(sys.argv[-1])), Executor(1 if scheduler else 2, scheduler)
     with progress.Stages() as report:
-        for count, _ in enumerate(executor.run(work, range(1000), report), start=1):
+        for count, _ in enumerate(executor.run(work, range(1000)), start=1):
             report("numbers", count, 1000)
 
 if __name__ == "__main__":
@@ -164,23 +164,6 @@ def test_ctrl_c_and_a_kill_end_all_processes_in_the_midst_of_pieces(
     wait_for(lambda: not alive(workers), 10)
 
 
-def test_ctrl_c_that_another_thread_receives_ends_the_work(tmp_path: Path) -> None:
-    work, ended, ignored = Numbers(tmp_path, seconds=1000), threading.Event(), threading.Event()
-
-    def stop() -> None:
-        wait_for(lambda: len(work.begun()) == 2)
-        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
-        if not ended.wait(30):
-            ignored.set()
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-
-    threading.Thread(target=stop, daemon=True).start()
-    with pytest.raises(KeyboardInterrupt):
-        list(Executor(2).run(work, range(2)))
-    ended.set()
-    assert not ignored.is_set()
-
-
 def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_told_in_one_line(
     started: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
@@ -189,31 +172,26 @@ def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_to
     scheduler = started("-m", "distributed.cli.dask_scheduler", *settings)
     address = line_with("Scheduler at:", scheduler).split()[-1]
     command = started(str(tmp_path / "command.py"), "work", str(tmp_path), "--scheduler", address, "0.01")
-    assert f"dask worker {address} --nthreads 1: 0/1" in line_with("waiting for a worker", command)
+    assert f"dask worker {address}" in line_with("has no worker yet", command)
     started("-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1")
     assert line_with("numbers: 1/1000", command)
     scheduler.kill()
     _, errors = command.communicate(timeout=120)
-    lines = [line for line in errors.splitlines() if not line.startswith(("numbers", "waiting for a worker"))]
+    lines = [line for line in errors.splitlines() if not line.startswith("numbers")]
     assert len(lines) == 1, errors
     assert lines[0].startswith(f"error: {address}: the Dask scheduler has ended")
     assert "the same command goes on" in lines[0]
     assert command.returncode == 1
 
 
-def test_a_cluster_does_the_pieces_and_its_loss_ends_the_work(tmp_path: Path) -> None:
+def test_a_cluster_does_the_pieces_and_raises_their_faults(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     options: Any = {"n_workers": 1, "threads_per_worker": 2, "dashboard_address": None, "processes": False}
-    with distributed.LocalCluster(resources={"renderer": 2}, **options) as cluster:
-        executor, work = Executor(scheduler=cluster.scheduler_address, resource="renderer"), Numbers(tmp_path)
-        assert {piece for piece, _ in executor.run(work, range(8))} == set(range(8))
+    with distributed.LocalCluster(**options) as cluster:
+        executor = Executor(scheduler=cluster.scheduler_address)
+        assert {piece for piece, _ in executor.run(Numbers(tmp_path), range(8))} == set(range(8))
         with pytest.raises(OSError, match="No space left on device"):
             list(executor.run(Numbers(tmp_path, full=1), range(3)))
-        results = executor.run(Numbers(tmp_path, seconds=2.5), range(8))
-        next(results)
-        cluster.scale(0)
-        with pytest.raises(WorkerLostError, match="all workers of the cluster are gone"):
-            list(results)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,10 +204,7 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch: 
         list(Executor(scheduler="tcp://127.0.0.1:9").run(Numbers(tmp_path), range(2)))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "field"),
-    [((0,), "workers"), ((2, "tcp://here"), "workers"), ((1, None, "GPU"), "resource")],
-)
-def test_executors_that_make_no_sense_are_refused(arguments: tuple[Any, ...], field: str) -> None:
-    with pytest.raises(InputError, match=f"^{field}: "):
+@pytest.mark.parametrize("arguments", [(0,), (2, "tcp://here")])
+def test_executors_that_make_no_sense_are_refused(arguments: tuple[Any, ...]) -> None:
+    with pytest.raises(InputError, match=r"^workers: "):
         Executor(*arguments)

@@ -13,7 +13,6 @@ from tiny_datasets import NESTED, OWN, by_count, write_dataset
 from twins import unit_grid
 
 from pcii.base.plain_text import visible
-from pcii.base.short_form import listed
 from pcii.metrics.scoring import score
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import open_dataset
@@ -77,11 +76,6 @@ def test_nothing_seen_has_no_depth() -> None:
     truth = Truth(np.full((1, 1), np.inf), np.zeros((1, 1), int), {})
     assert repr(depth) == "DepthMap(shape=1 x 1, answered=0.00%)"
     assert repr(truth) == "Truth(shape=1 x 1, objects=[])"
-
-
-def test_long_lists_tell_their_ends() -> None:
-    assert listed([540.0, 540.25, 620]) == "[540, 540.25, 620]"
-    assert listed(list(range(450, 480))) == "[450 .. 479: 30 in all]"
 
 
 def test_notebooks_show_what_plot_draws(values: list[tuple[object, str]]) -> None:

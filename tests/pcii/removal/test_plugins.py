@@ -118,7 +118,7 @@ def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
 
 def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, **{"../good": "strange_code:good"})
-    with pytest.raises(InputError, match=r"is named '\.\./good'; use letters"):
+    with pytest.raises(InputError, match=r"needs another name than '\.\./good'"):
         removal_methods()
 
 
