@@ -3,12 +3,10 @@
 It depends on the data and the terms alone, and no manifest lists it: other terms make no other dataset.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pcii.base.plain_text import in_json, in_markdown, web_address
+from pcii.base.plain_text import in_markdown, web_address
 from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
 from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
@@ -24,7 +22,11 @@ CITATION = (
 """As CITATION.cff has it."""
 INSTALL = f"import pcii  # pip install {PROJECT}"
 """A README.md without this line is somebody else's."""
-HOW_TO_READ = """```python
+TEXT = """# {title}
+
+{content}
+
+```python
 {install}
 
 {example}
@@ -32,8 +34,13 @@ dataset.counts, dataset.truth, dataset.views, dataset.grid
 ```
 
 X points right, Y down, Z forward, in millimetres; `z` is planar depth. Each array says its axes, unit and
-meaning in its attributes. `manifest.json` has the recipe, from which `simgen generate` makes the same data,
-and the SHA-256 of every file, with which `simgen verify` compares them."""
+meaning in its attributes. The manifest has the recipe, from which `simgen generate` makes the same data, and
+the SHA-256 of every file, with which `simgen verify` compares them.
+
+Licence: {licence}. By {creators}. Please cite:
+
+> {citation}
+"""
 
 
 @dataclass(frozen=True)
@@ -52,68 +59,32 @@ def write_card(root: Path, terms: Terms) -> None:
     An earlier one is replaced, and one that somebody else has written is left alone. Nothing is written where
     it is there already, so that a folder that is read-only will do.
     """
-    parts = _of_collection(root) if is_collection(root) else _of_dataset(root)
-    text = "\n\n".join(part for part in (*parts, *_terms(terms)) if part) + "\n"
-    content = text.encode(errors="backslashreplace")
-    file = root / CARD
+    if is_collection(root):
+        fields = ", ".join(read_collection(root).fields)
+        title, example = "Integral images", 'dataset = pcii.open_collection("FOLDER")[0]'
+        content = f"A collection of {len(read_index(root))} datasets, which differ in {in_markdown(fields)}."
+    else:
+        manifest, example = read_manifest(root), 'dataset = pcii.open_dataset("FOLDER")'
+        title, grid = manifest.title or "Integral images", manifest.grid
+        pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
+        content = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, {pattern}."
+    address = web_address(terms.licence) or web_address(f"https://spdx.org/licenses/{terms.licence}.html")
+    text = TEXT.format(
+        title=in_markdown(title),
+        content=f"Integral imaging in little light. {content}",
+        install=INSTALL,
+        example=example,
+        licence=f"[{in_markdown(terms.licence)}](<{address}>)",
+        creators=", ".join(in_markdown(name) for name in terms.creators),
+        citation=in_markdown(f"{terms.citation} {terms.url}".strip()),
+    )
+    encoded, file = text.encode(errors="backslashreplace"), root / CARD
     if file.is_file():
         present = file.read_bytes()
-        is_written = present == content and not temporaries_of(root, CARD)
+        is_written = present == encoded and not temporaries_of(root, CARD)
         if is_written or INSTALL.encode() not in present:
             return
     with locked(root / (COLLECTION if is_collection(root) else MANIFEST), wait=True):
-        for temporary in temporaries_of(root, CARD):
+        for temporary in temporaries_of(root, CARD):  # of a command that was killed
             temporary.unlink()
-        write_bytes_safely(file, content)
-
-
-def _of_dataset(root: Path) -> list[str]:
-    manifest = read_manifest(root)
-    grid, recipe = manifest.grid, manifest.recipe
-    scene = f" of the scene {name}" if (name := recipe.get("scene")) else ""
-    pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
-    photons = (manifest.photons or {}).get("total")
-    total = "" if photons is None else f" {photons} photons were counted in all."
-    objects = ", ".join(in_markdown(str(name)) for name in manifest.objects.values())
-    return [
-        f"# {in_markdown(manifest.title or 'Integral images')}",
-        f"Integral imaging in little light: {grid.rows} x {grid.cols} views of {grid.height} x "
-        f"{grid.width} pixels{in_markdown(scene)}, {pattern}.{total}",
-        f"Objects: {objects}." if objects else "",
-        HOW_TO_READ.format(install=INSTALL, example='dataset = pcii.open_dataset("FOLDER")'),
-    ]
-
-
-def _of_collection(root: Path) -> list[str]:
-    document, rows = read_collection(root), read_index(root)
-    recipe = document.recipe
-    title = recipe.get("title") or f"Integral images of {recipe.get('scene') or 'many scenes'}"
-    differing = "; ".join(_values_of(field, rows) for field in document.fields)
-    return [
-        f"# {in_markdown(title)}",
-        f"A collection of {len(rows)} datasets of integral imaging in little light, made by simulation: a "
-        "folder for each, `collection.json` (the recipe that all have in common) and `index.jsonl` (a line "
-        "for each dataset).",
-        f"What differs between them: {differing}.",
-        HOW_TO_READ.format(install=INSTALL, example='dataset = pcii.open_collection("FOLDER")[0]'),
-    ]
-
-
-def _values_of(field: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """The values of a field, some of them where there are many."""
-    values = list(dict.fromkeys(in_json(row["values"][field]) for row in rows))
-    shown = values if len(values) <= 6 else [*values[:3], "...", values[-1]]
-    return f"`{field}` ({len(values)} values: {', '.join(in_markdown(value) for value in shown)})"
-
-
-def _terms(terms: Terms) -> list[str]:
-    licence = in_markdown(terms.licence)
-    is_address = "://" in terms.licence
-    link = web_address(terms.licence if is_address else f"https://spdx.org/licenses/{terms.licence}.html")
-    address = web_address(terms.url)
-    return [
-        f"Licence: {f'[{licence}](<{link}>)' if link else licence}. "
-        f"By {', '.join(in_markdown(name) for name in terms.creators)}. Please cite:",
-        f"> {in_markdown(terms.citation)}",
-        f"Where: {f'<{address}>' if address else in_markdown(terms.url)}" if terms.url else "",
-    ]
+        write_bytes_safely(file, encoded)

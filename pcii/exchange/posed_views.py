@@ -6,7 +6,6 @@ those of the pictures.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,8 +21,6 @@ from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
 
-MOST_CAMERAS = 1000
-"""All pairs of rows, and of columns, are compared: half a million of a single row."""
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
 what is nearer is seen by at most four cameras of a row. Their depth is focal length in px x pitch /
@@ -36,7 +33,7 @@ DIGITS = 9
 USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
 ROUNDING = 1e-9
-"""Of numbers of poses that are equal: metres, or parts of a rotation."""
+"""Of numbers that are equal: metres, parts of a rotation, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,81 +185,65 @@ def camera_grid_of(
 
 
 def find_grid(file: TransformsFile) -> PoseGrid:
-    """The grid of the frames of a file, in whichever order they are.
+    """The grid of the frames of a file, in whichever order they are, fitted by least squares.
 
-    Raises `InputError` with the frame and by how much it is off: a camera that is turned, or not in its
-    place; a place without a camera, or with two; a principal point that is not linear in the camera's place.
+    Raises `InputError` for cameras that are no such grid, with the frame that is off most.
     """
-    count = len(file.poses)
-    if count > MOST_CAMERAS:
-        raise InputError(f"{file.path}: frames: {count} cameras, and a grid has at most {MOST_CAMERAS}")
     place_mm = _places_in_common_frame(file)
-    apart = _nearest_mm(place_mm) / 4
-    if apart == 0:
-        raise InputError(f"{file.path}: frames: most cameras are at the same place as another one")
-    (x0, step_x, cols, col_of), (y0, step_y, rows, row_of) = (
-        _lattice_of(places, apart) for places in place_mm[:2]
-    )
-    pitch = step_x or step_y or 1.0, step_y or step_x or 1.0
-    off_mm = np.stack([place_mm[0] - x0 - step_x * col_of, place_mm[1] - y0 - step_y * row_of, place_mm[2]])
+    col, row = (_groups_of(values, _nearest_mm(place_mm) / 4) for values in place_mm[:2])
+    count, cols, rows = len(file.poses), col.max() + 1, row.max() + 1
+    numbers = np.full((rows, cols), -1)
+    numbers[row, col] = np.arange(count)
+    if count != numbers.size or numbers.min() < 0:
+        loneliest = np.argmin(np.bincount(col)[col] * np.bincount(row)[row])
+        raise InputError(
+            f"{file.path}: frames: {count} cameras do not stand one at each place of a plane grid, here of "
+            f"{rows} rows and {cols} columns; {file.frame_name(int(loneliest))} has the fewest in line with it"
+        )
+    steps = col - (cols - 1) / 2, row - (rows - 1) / 2, np.zeros(count)
+    places = [_fit_line(step, values) for step, values in zip(steps, place_mm, strict=True)]
+    pitch = places[0][1] or places[1][1] or 1.0, places[1][1] or places[0][1] or 1.0
+    off_mm = np.stack([off for *_, off in places])
     side_px = max(file.width, file.height)
     nearest_mm = file.focal_px * min(pitch) / (NEAREST_SHARE * side_px)
     moved_px = (file.focal_px * np.hypot(*off_mm[:2]) + side_px / 2 * np.abs(off_mm[2])) / nearest_mm
-    worst = int(np.argmax(moved_px))
-    if count > 1 and moved_px[worst] > MOST_PX:
-        right, down, forward = np.round(off_mm[:, worst], 9) + 0.0  # no -0
-        raise InputError(
-            f"{file.path}: {file.frame_name(worst)} is {np.linalg.norm(off_mm[:, worst]):.3g} mm from its "
-            f"place in a plane grid of {rows} x {cols} cameras, {right:.3g} to the right, {down:.3g} down, "
-            f"{forward:.3g} forward; that moves near points by {moved_px[worst]:.2g} px, and {MOST_PX:g} is "
-            "allowed"
-        )
-    numbers = np.full((rows, cols), -1)
-    numbers[row_of, col_of] = np.arange(count)
-    twice = np.flatnonzero(numbers[row_of, col_of] != np.arange(count))
-    if twice.size:
-        names = (file.frame_name(int(n)) for n in (twice[0], numbers[row_of, col_of][twice[0]]))
-        raise InputError(f"{file.path}: {' and '.join(names)} are at the same place of the grid")
-    if count < numbers.size:
-        k, l = np.argwhere(numbers < 0)[0].tolist()
-        raise InputError(
-            f"{file.path}: frames: no camera at ({k}, {l}) (row from the top, column from the left) of a "
-            f"grid of {rows} x {cols}, where {count} have one; every place of the grid needs a picture"
-        )
-    (shear_x, offset_x), (shear_y, offset_y) = _centres(file, (col_of, row_of), (cols, rows))
+    _check_moved(file, moved_px, np.linalg.norm(off_mm, axis=0), "mm from its place in a plane grid")
+    from_middle = (file.centres_px - np.array([file.width, file.height]) / 2).T
+    centres = [_fit_line(step, values) for step, values in zip(steps[:2], from_middle, strict=True)]
+    off_px = np.hypot(centres[0][2], centres[1][2])
+    _check_moved(file, off_px, off_px, "px from where cx and cy of a grid with one shear would be")
+    (offset_x, shear_x, _), (offset_y, shear_y, _) = centres
     return PoseGrid(
         numbers,
         pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
-        shear_px=(shear_x, shear_y),
-        offset_px=(offset_x, offset_y),
+        shear_px=(_digits(shear_x), _digits(shear_y)),
+        offset_px=(_digits(offset_x), _digits(offset_y)),
     )
 
 
 def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
-    """Places (3, N) in mm to the right, down and forward in the common orientation of the cameras.
-
-    That is the rotation nearest to the median of all matrices, element by element: a few cameras that are
-    turned do not move it, so that the angle in the message is their own.
-    """
+    """Places (3, N) in mm to the right, down and forward in the mean orientation of the cameras."""
     turns = file.poses[:, :3, :3]
-    left, _, right = np.linalg.svd(np.median(turns, axis=0))
+    left, _, right = np.linalg.svd(turns.mean(axis=0))
     common = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     # |A - B| of two rotations is 2 sqrt(2) sin(angle / 2), exact for small angles too.
     chord = np.linalg.norm(turns - common, axis=(1, 2)) / np.sqrt(8)
     angle = 2 * np.arcsin(np.minimum(chord, 1))
     corner_px = np.hypot(file.width, file.height) / 2
     moved_px = angle * (file.focal_px + corner_px**2 / file.focal_px)
+    _check_moved(file, moved_px, np.degrees(angle), "degrees turned from the mean orientation")
+    place_mm = MM_PER_M * (file.poses[:, :3, 3] - file.poses[:, :3, 3].mean(axis=0))
+    return (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
+
+
+def _check_moved(file: TransformsFile, moved_px: np.ndarray, off: np.ndarray, what: str) -> None:
+    """Refuse the camera that moves points most, if that is more than `MOST_PX`."""
     worst = int(np.argmax(moved_px))
     if moved_px[worst] > MOST_PX:
-        limit = np.degrees(angle[worst] * MOST_PX / moved_px[worst])
         raise InputError(
-            f"{file.path}: {file.frame_name(worst)} is turned by {np.degrees(angle[worst]):.3g} degrees "
-            f"from the common orientation; cameras of a grid are parallel, to {limit:.2g} degrees here"
+            f"{file.path}: {file.frame_name(worst)} is {off[worst]:.3g} {what}; that moves points by "
+            f"{moved_px[worst]:.2g} px, and {MOST_PX:g} is allowed"
         )
-    place_mm = MM_PER_M * (file.poses[:, :3, 3] - np.median(file.poses[:, :3, 3], axis=0))
-    place_mm = (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
-    place_mm[2] -= np.median(place_mm[2])
-    return place_mm
 
 
 def _nearest_mm(place_mm: np.ndarray) -> float:
@@ -275,61 +256,22 @@ def _nearest_mm(place_mm: np.ndarray) -> float:
     return float(np.median(np.asarray(distances)[:, 1]))
 
 
-def _lattice_of(values: np.ndarray, apart: float) -> tuple[float, float, int, np.ndarray]:
-    """Evenly spaced numbers: the first, the step (0 of one), how many, and which of them each value (N,) is.
-
-    Values closer than `apart` are of one place. Places with less than half as many values as the fullest one
-    are left out of the fit, so that few values that are wrong move no other.
-    """
-    ordered = np.sort(values)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
-    fullest = max(map(len, groups))
-    centres = np.array([np.median(group) for group in groups if 2 * len(group) >= fullest])
-    if centres.size == 1:
-        return float(centres[0]), 0.0, 1, np.zeros(len(values), np.int64)
-    gaps = np.diff(centres)
-    usual = np.quantile(gaps, 0.5, method="lower")
-    number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / usual), 1))])
-    origin, step = _line_through(number, centres)
-    count = int(number[-1]) + 1
-    return origin, step, count, np.clip(np.rint((values - origin) / step), 0, count - 1).astype(np.int64)
+def _groups_of(values: np.ndarray, apart: float) -> np.ndarray:
+    """Number (N,) of the group of each value; groups have gaps of more than `apart` between them."""
+    order = np.argsort(values)
+    groups = np.empty(values.size, np.int64)
+    groups[order] = np.cumsum(np.diff(values[order], prepend=values.min()) > apart)
+    return groups
 
 
-def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Value at x = 0 and slope of a line: medians over all pairs of points (Theil 1950, Sen 1968).
-
-    It stays as it is if less than 29 % of the points are wrong.
-    """
-    from scipy.stats import theilslopes
-
-    line: Any = theilslopes(y, x, method="joint")
-    return float(line.intercept), float(line.slope)
-
-
-def _centres(
-    file: TransformsFile, index: tuple[np.ndarray, np.ndarray], counts: tuple[int, int]
-) -> list[tuple[float, float]]:
-    """Shear and offset in px, each of x and of y; refuses what is not linear in the camera's place."""
-    lines, off = [], np.zeros((2, len(index[0])))
-    for axis, side in enumerate((file.width, file.height)):
-        from_middle = file.centres_px[:, axis] - side / 2
-        typical = np.array([np.median(from_middle[index[axis] == number]) for number in range(counts[axis])])
-        steps = np.arange(counts[axis]) - (counts[axis] - 1) / 2
-        offset, shear = _line_through(steps, typical) if counts[axis] > 1 else (float(typical[0]), 0.0)
-        off[axis] = from_middle - (offset + shear * steps[index[axis]])
-        lines.append(tuple(0.0 if abs(v) < 1e-12 * side else _digits(v) for v in (shear, offset)))
-    off_px = np.hypot(*off)
-    worst = int(np.argmax(off_px))
-    if off_px[worst] > MOST_PX:
-        raise InputError(
-            f"{file.path}: {file.frame_name(worst)}: its principal point (cx, cy) is {off_px[worst]:.3g} px "
-            "from where those of the others put it; from camera to camera it moves by one shear"
-        )
-    return lines
+def _fit_line(step: np.ndarray, values: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Mean, slope and residuals of values (N,) over steps, whose mean is 0, by least squares."""
+    slope = float(step @ values / max(step @ step, 0.5))
+    return float(values.mean()), slope, values - values.mean() - slope * step
 
 
 def _digits(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+    return float(f"{value:.{DIGITS}g}") if abs(value) > ROUNDING else 0.0
 
 
 def _depths(file: TransformsFile, poses: PoseGrid, tell: Tell) -> np.ndarray | None:

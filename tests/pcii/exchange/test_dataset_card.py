@@ -44,7 +44,7 @@ def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
     for words in ("CC-BY-4.0", "Ada, Grace", TERMS.citation, TERMS.url):
         assert words in text
     if make is make_collection:
-        assert "`photons.budget` (2 values: 10.0, 20.0)" in text
+        assert "2 datasets, which differ in photons.budget" in text
     (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")
     with pytest.raises(InputError, match=r"not listed in .*, and read by nothing"):
         verify(root)
