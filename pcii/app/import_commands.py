@@ -152,7 +152,7 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         (answer if note.startswith("warning") else say)(note)
-    advice = None if imported.states_cameras else _advice(fit, order, lenses)
+    advice = None if imported.states_cameras else _advice(fit, order, lenses, z_range)
     if advice is not None:
         answer(f"warning: {advice}; then delete {out} and import again")
         return
@@ -160,7 +160,7 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses) -> str | None:
+def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:
     """What would make the views fit the cameras, in words of options; None if they do."""
     sentences: list[str] = []
     if fit.order is not None:
@@ -180,9 +180,9 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses) -> str | None:
             "things are sharp at disparities below 0, as of pictures that were shifted so that something "
             f"stands still: give that shift as --shear-px; {x:g} {y:g} or more brings all in front"
         )
-    if fit.outside_mm is not None:
+    if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
         sentences.append(
-            f"most is sharp at about {_three_digits(fit.outside_mm)} mm, outside of --z-range-mm; correct "
+            f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm; correct "
             "--pitch-mm, --focal-mm or the size of pixels, or the range"
         )
     return "; ".join(sentences) or None

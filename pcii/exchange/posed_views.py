@@ -198,7 +198,7 @@ def find_grid(file: TransformsFile) -> PoseGrid:
         loneliest = np.argmin(np.bincount(col)[col] * np.bincount(row)[row])
         raise InputError(
             f"{file.path}: frames: {count} cameras do not stand one at each place of a plane grid, here of "
-            f"{rows} rows and {cols} columns; {file.frame_name(int(loneliest))} has the fewest in line with it"
+            f"{rows} x {cols}; {file.frame_name(int(loneliest))} has the fewest in line with it"
         )
     steps = col - (cols - 1) / 2, row - (rows - 1) / 2, np.zeros(count)
     places = [_fit_line(step, values) for step, values in zip(steps, place_mm, strict=True)]
