@@ -1,25 +1,23 @@
-"""Pictures and photon cubes with the poses of their cameras, which have to be of one plane grid.
+"""Pictures with the poses of their cameras, which have to be of one plane grid.
 
 The frames of a transforms.json may be in any order and the rig anywhere in the world: right and down are
 those of the pictures.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.exchange.count_arrays import add_frames, frames_of_files, map_array
-from pcii.exchange.export_pictures import DEPTH_UNIT_M, MM_PER_M
-from pcii.exchange.image_folders import KnownViews, pictures_of, radiance_of_views, views_of
-from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of
+from pcii.exchange.export_pictures import MM_PER_M
+from pcii.exchange.image_folders import pictures_of, radiance_of_views, views_of
+from pcii.exchange.pixel_files import Encoding, check_encoding, decode
 from pcii.exchange.stated_cameras import Tell, warn
 from pcii.exchange.transforms_file import MOST_PX, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.types.images import Views
 
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
@@ -61,8 +59,8 @@ def import_posed_pictures(
     cfa: str | None = None,
     report: Report = silent,
     tell: Tell = warn,
-) -> KnownViews:
-    """Views, cameras and depths of a transforms.json, whose poses are of one plane grid of parallel cameras.
+) -> Views:
+    """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
 
     The file tells the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
     says how large the film is. Whole numbers are sRGB and floats linear, unless `encoding` says otherwise;
@@ -71,8 +69,6 @@ def import_posed_pictures(
     """
     check_encoding(encoding)
     file = read_transforms(source, tell=tell)
-    if file.is_stack:
-        raise InputError(f"{file.path}: file_path: expected one in each frame; it is of all frames")
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
     files = np.array(file.file_paths, object)[poses.numbers]
@@ -83,61 +79,7 @@ def import_posed_pictures(
             f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "
             f"{grid.height} x {grid.width}, rows x columns"
         )
-    view_z_mm = _depths(file, poses, tell)
-    truth = None
-    if view_z_mm is not None and grid.rows % 2 and grid.cols % 2:  # the middle view is the virtual centre
-        middle = view_z_mm[grid.rows // 2, grid.cols // 2]
-        truth = Truth(middle, np.zeros(middle.shape, np.int16), {})
-    return KnownViews(views_of(radiance, grid, cfa), truth, view_z_mm)
-
-
-def import_cubes(
-    source: str | Path,
-    *,
-    focal_mm: float | None = None,
-    pixel_mm: float | None = None,
-    sensor_mm: float | None = None,
-    cfa: str | None = None,
-    frames: tuple[int, int] | None = None,
-    report: Report = silent,
-    tell: Tell = warn,
-) -> PhotonCounts:
-    """Photon counts of the photon cubes of a transforms.json that says `bitpack`.
-
-    Of a grid it has a frame for each camera, whose `file_path` is a cube (T, H, W / 8). Of one camera it is a
-    dataset of visionsim: one cube, and a pose for each of its frames, which must be alike. `frames` are the
-    first and the last to add up; `cfa` is the Bayer pattern where the file says none. Raises `InputError`,
-    naming file and member, for cameras that are no grid, and cubes that do not fit what the file says.
-    """
-    file = read_transforms(source, tell=tell)
-    document = file.document
-    if document.bitpack_dim != 2 or document.c not in (None, 1):
-        raise InputError(
-            f"{file.path}: bitpack_dim, c: expected 2 and 1: one channel, packed along the width"
-        )
-    pattern = None if document.cfa == "none" else document.cfa
-    if pattern is not None and cfa not in (None, pattern):
-        raise InputError(f"{file.path}: cfa: is {pattern}; leave out --cfa")
-    cameras = file
-    if file.is_stack:
-        if np.ptp(file.poses, axis=0).max() + np.ptp(file.centres_px, axis=0).max() > ROUNDING:
-            raise InputError(f"{file.path}: frames: the camera moves, and a moving camera is no grid")
-        cameras = replace(file, poses=file.poses[:1], centres_px=file.centres_px[:1])
-    poses = find_grid(cameras)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
-    stacks = frames_of_files(np.array(file.file_paths, object)[poses.numbers])
-    first = stacks[0, 0].load()
-    for number in (document.num_frames, len(file.poses) if file.is_stack else None):
-        if number not in (None, len(first)):
-            raise InputError(f"{file.path}: frames: says {number}, and {stacks[0, 0].name} has {len(first)}")
-
-    def stated_grid(shape: tuple[int, ...]) -> CameraGrid:
-        if shape != grid.shape_KLHW:
-            raise InputError(f"{stacks[0, 0].name}: is {shape[2]} px high, and h is {grid.height}")
-        return grid
-
-    options = {"frames": frames, "cfa": pattern or cfa, "report": report, "tell": tell}
-    return add_frames(stacks, stated_grid, bitpack=True, width=grid.width, **options)
+    return views_of(radiance, grid, cfa)
 
 
 def camera_grid_of(
@@ -272,29 +214,3 @@ def _fit_line(step: np.ndarray, values: np.ndarray) -> tuple[float, float, np.nd
 
 def _digits(value: float) -> float:
     return float(f"{value:.{DIGITS}g}") if abs(value) > ROUNDING else 0.0
-
-
-def _depths(file: TransformsFile, poses: PoseGrid, tell: Tell) -> np.ndarray | None:
-    """Depth of every view in mm; None, which is told, if it is not known of all."""
-    paths = [path for path in file.depth_paths if path is not None]
-    if not paths:
-        return None
-    if len(paths) < poses.numbers.size or not {path.suffix for path in paths} <= {".npy", ".png", ".tif"}:
-        tell("not used: depth_file_path; expected a .npy, .png or .tif file of every frame")
-        return None
-    unit_mm = MM_PER_M * (file.document.depth_unit_scale_factor or DEPTH_UNIT_M)
-    depths = np.empty((*poses.numbers.shape, file.height, file.width), np.float32)
-    for camera, path in np.ndenumerate(np.array(paths, object)[poses.numbers]):
-        is_array = path.suffix == ".npy"
-        numbers = map_array(path)[..., None] if is_array else next(decode(picture_of(path, ("PNG", "TIFF"))))
-        if numbers.dtype.kind not in "fu" or numbers.shape != (*depths.shape[2:], 1):
-            raise InputError(
-                f"{path}: expected {file.height} x {file.width} numbers, got {numbers.dtype} {numbers.shape}"
-            )
-        with np.errstate(over="ignore"):
-            z_mm = numbers[..., 0].astype(np.float32) * np.float32(unit_mm)
-        if not (z_mm >= 0).all():
-            raise InputError(f"{path}: holds NaN or depths below 0")
-        depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
-    tell(f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit")
-    return depths

@@ -2,7 +2,6 @@
 """`pcii import` as a new user types it, and fifty ways to give it something wrong."""
 
 import re
-import shutil
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -163,10 +162,8 @@ def test_other_sources(tmp_path: Path, capsys) -> None:
     ("make", "options", "flags"),
     [
         ("hci", ["--grid", 3, 3], "--grid"),
-        ("hci", ["--array", "a", "--pitch-mm", 2, 2], "--array, --pitch-mm"),
+        ("hci", ["--width", 3, "--pitch-mm", 2, 2], "--width, --pitch-mm"),
         ("lenses", ["--lens-array", 1, 2, "--lens-pitch-px", 4, 6, "--grid", 1, 2], "--grid"),
-        ("lenses", ["--array", "a"], "--array"),
-        ("folder", [*NAMED, "--array", "a"], "--array"),
         ("folder", [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames"),
         ("folder", [*NAMED, "--inverted"], "--inverted"),
         ("folder", [*NAMED, "--counts", "--linear"], "--linear"),
