@@ -36,7 +36,6 @@ def import_dataset(
     out: Out,
     pattern: str | None = None,
     grid: WholePair = None,
-    array: str | None = None,
     counts: bool = False,
     bitpack: bool = False,
     width: int | None = None,
@@ -75,8 +74,8 @@ def import_dataset(
     ----------
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
-        benchmark, pictures or photon cubes with a transforms.json, a picture of a lens array, an array in a
-        .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
+        benchmark, pictures with a transforms.json, a picture of a lens array, an array in a
+        .npy file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
     out
         Folder for the dataset: new or empty.
     pattern
@@ -85,8 +84,6 @@ def import_dataset(
     grid
         Rows and columns of cameras, for {index}, for pages, and for arrays whose first axis counts the views.
         Default: square.
-    array
-        Name of the array in an .npz file that has several.
     counts
         The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
     bitpack
@@ -116,7 +113,7 @@ def import_dataset(
     """
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
-    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "array": array, "counts": counts}
+    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "counts": counts}
     options |= {"bitpack": bitpack, "width": width, "frames": frames}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light):
@@ -138,7 +135,6 @@ def import_dataset(
             out,
             images,
             imported.truth,
-            view_z_mm=imported.view_z_mm,
             z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
@@ -152,7 +148,7 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    advice = None if imported.states_cameras else _advice(fit, order, lenses)
+    advice = None if imported.states_cameras else _advice(fit, order, lenses, z_range)
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
@@ -160,7 +156,7 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses) -> str | None:
+def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:
     """What would make the views fit the cameras, in words of options; None if they do."""
     sentences: list[str] = []
     if fit.order is not None:
@@ -180,9 +176,9 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses) -> str | None:
             "things are sharp at disparities below 0, as of pictures that were shifted so that something "
             f"stands still: give that shift as --shear-px; {x:g} {y:g} or more brings all in front"
         )
-    if fit.outside_mm is not None:
+    if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
         sentences.append(
-            f"most is sharp at about {_three_digits(fit.outside_mm)} mm, outside of --z-range-mm; correct "
+            f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm; correct "
             "--pitch-mm, --focal-mm or the size of pixels, or the range"
         )
     return "; ".join(sentences) or None

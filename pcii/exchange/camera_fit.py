@@ -8,7 +8,7 @@ all signs: what is behind the cameras in one order is in front of them in the ot
 Notation: V views, (h, w) cells of pixels, P planes.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -22,26 +22,24 @@ from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px, total_
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
-MOST_CAMERAS = 5
+MAX_CAMERAS = 5
 """Largest number of camera rows, and of columns, that are used: first, last, and equally spread between."""
 COARSE_CELLS, FINE_CELLS = 128, 512
-"""Largest side of the views in cells, to try orders and to refine depths."""
-FEWEST_CELLS = 16
+"""Largest side of the views in cells, to try orders and to place depths."""
+MIN_CELLS = 16
 """Smaller views are not judged."""
 PHOTONS_PER_CELL = 4.0
 """Of counts; with fewer the noise hides the texture."""
 BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0
 """Views are blurred, so that half cells do not matter, and lose what is smooth, such as vignetting."""
-BLUR_PLANES = 1.0
-"""Of what is sharp at each plane, half a fine cell apart; with less one surface may be named twice."""
-WINDOW_CELLS, LEAST_SHARE = 5, 0.6
+WINDOW_CELLS, MIN_SHARE = 5, 0.6
 """Side of the window over which the variance is averaged; share of the views that have to reach a cell, and
 of the cells that have to be reached in a window."""
-BETTER, RANDOM_ORDERS = 0.75, 3
-"""An order is better than another one, or than random ones, if at most this share of the variance remains."""
-SHARP, FEWEST_SHARP = 0.5, 0.02
+BETTER = 0.75
+"""An order is better than others if at most this share of their variance remains."""
+SHARP, MIN_SHARP = 0.5, 0.02
 """At a surface the variance is at most this share of its mean over the planes; least share of such cells."""
-PEAK_SHARE, MOST_PEAKS = 0.08, 4
+PEAK_SHARE, MAX_PEAKS = 0.08, 4
 """Least share of what is sharp that a depth has, and the largest number of depths."""
 BEHIND_SHARE = 0.12
 """Largest share of what seems sharp by chance behind the cameras."""
@@ -61,8 +59,6 @@ class CameraFit:
     """An order of the stored views that explains them clearly better than the stated one."""
     shear_px: tuple[float, float] | None = None
     """A shift that brings all that is sharp in front of the cameras, where no order does."""
-    outside_mm: float | None = None
-    """A depth outside the stated range, if most of what is sharp is sharp outside."""
 
 
 def check_grid(
@@ -74,84 +70,82 @@ def check_grid(
 ) -> CameraFit:
     """Where views are sharp, and what explains them better than their cameras.
 
-    They were stored in the `order`, as a table or `counted` one by one. Without a range all depths are looked
-    at whose parallax is not larger than the views. Small views, single ones and those without texture, or
-    with too few photons, are not judged. Raises `InputError` for a range that is not 0 < near < far, and for
-    views that hold NaN or infinity.
+    They were stored in the `order`, as a table or `counted` one by one. All depths are looked at whose
+    parallax is not larger than the views, or four times that of a range. Small views, single ones and those
+    without texture, or with too few photons, are not judged. Raises `InputError` for a range that is not
+    0 < near < far, and for views that hold NaN or infinity.
     """
     if z_range_mm is not None:
         check_depth_range(z_range_mm)
     grid, side = images.grid, _cell_side(images, COARSE_CELLS)
-    if grid.view_count < 2 or min(grid.height, grid.width) < FEWEST_CELLS * side:
+    if grid.view_count < 2 or min(grid.height, grid.width) < MIN_CELLS * side:
         return CameraFit()
     reach = float(max(grid.height, grid.width))
     if z_range_mm is not None:
         ends = total_disparity_px(grid, np.array(z_range_mm)) - _still_px(grid)
-        reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), FEWEST_CELLS / 2 * side))
+        reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), MIN_CELLS / 2 * side))
     shifts_px = side * np.arange(-np.ceil(reach / side), np.ceil(reach / side) + 1)
-    cells, table = _cells_of(images, side), np.arange(grid.view_count).reshape(grid.rows, grid.cols)
-    variance, best_order, best_grid = _sweep(cells, table, grid, shifts_px, side), order, grid
-    limit = BETTER * _remaining(variance)
-    for other, other_table in _other_orders(grid, order, counted):
-        other_grid = replace(grid, rows=other_table.shape[0], cols=other_table.shape[1])
-        other_variance = _sweep(cells, other_table, other_grid, shifts_px, side)
-        if _remaining(other_variance) < limit:
-            variance, best_order, best_grid = other_variance, other, other_grid
-            limit = _remaining(variance)
-    rng = np.random.default_rng(0)
-    by_chance = [
-        _remaining(_sweep(cells, rng.permutation(table.ravel()).reshape(table.shape), grid, shifts_px, side))
-        for _ in range(RANDOM_ORDERS)
-    ]
-    sharpness, is_sharp = _sharpness(variance)
-    mass, total_px = _by_plane(variance, sharpness * is_sharp), shifts_px + _still_px(best_grid)
+    cells = _cells_of(images, side)
+    tables = _tables_of_orders(grid, order, counted)
+    grids = {one: replace(grid, rows=table.shape[0], cols=table.shape[1]) for one, table in tables.items()}
+    variances = {one: _sweep(cells, table, grids[one], shifts_px, side) for one, table in tables.items()}
+    remaining = {one: _remaining(variance) for one, variance in variances.items()}
+    best = min(remaining, key=lambda one: remaining[one])
+    if remaining[best] >= BETTER * remaining[order]:
+        best = order
+    variance, total_px = variances[best], shifts_px + _still_px(grids[best])
     nearest_px = np.maximum(total_px[-1], side)
     fit = CameraFit(nearest_mm=float(depth_of_total_disparity_mm(grid, nearest_px)))
-    if is_sharp.mean() < FEWEST_SHARP or _remaining(variance) > BETTER * np.mean(by_chance):
+    sharpness, is_sharp = _sharpness(variance)
+    wrong = np.mean([value for one, value in remaining.items() if one != best])
+    if is_sharp.mean() < MIN_SHARP or remaining[best] > BETTER * wrong:
         return fit
-    fit = replace(fit, order=None if best_order == order else best_order)
+    fit = replace(fit, order=None if best == order else best)
+    mass = _by_plane(variance, sharpness * is_sharp)
     if mass[total_px < -side].sum() > BEHIND_SHARE:
-        turned_px = _still_px(best_grid) - shifts_px
-        is_behind = turned_px < -side
+        is_behind = _still_px(grids[best]) - shifts_px < -side  # of views whose two axes are turned
         if mass[is_behind].sum() <= BEHIND_SHARE and not is_behind[_peaks(mass)].any():
-            flips = best_order.flip_rows ^ (best_grid.rows > 1), best_order.flip_cols ^ (best_grid.cols > 1)
-            return replace(fit, order=replace(best_order, flip_rows=flips[0], flip_cols=flips[1]))
+            rows, cols = best.flip_rows ^ (grids[best].rows > 1), best.flip_cols ^ (grids[best].cols > 1)
+            return replace(fit, order=replace(best, flip_rows=rows, flip_cols=cols))
         least_px = float(shifts_px[np.searchsorted(mass.cumsum(), 0.02)])
-        x, y = 2 * max(-least_px, 0.0) * _per_total(best_grid)  # as far in front as it was behind
+        x, y = 2 * max(-least_px, 0.0) * _per_total(grids[best])  # as far in front as it was behind
         return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
     if fit.order is not None:
         return fit
-    near_px, far_px = np.inf, 0.0
-    if z_range_mm is not None:
-        near_px, far_px = total_disparity_px(grid, np.array(z_range_mm)).tolist()
-    # A plane more on either side belongs to the range: it may be nearest to one that does.
-    inside = np.where((total_px >= far_px - side) & (total_px <= near_px + side) & (total_px > 0), mass, 0)
-    if z_range_mm is not None and inside.sum() < 0.5:
-        outside_px = total_px[np.where((inside == 0) & (total_px > 0), mass, 0).argmax()]
-        return replace(fit, outside_mm=float(depth_of_total_disparity_mm(grid, outside_px)))
-    return replace(fit, z_mm=_refined_depths(images, variance, inside, total_px, side))
+    fine = min(_cell_side(images, FINE_CELLS), side)
+    fine_cells, depths = _cells_of(images, fine), set[float]()
+    for peak in _peaks(np.where(total_px > 0, mass, 0)):
+        near_px = shifts_px[peak] + np.arange(-2 * side, 2 * side + fine / 4, fine / 2)
+        close = _sweep(fine_cells, tables[order], grid, near_px, fine)
+        is_surface = is_sharp & (np.abs(variance.argmin(axis=0) - peak) <= 1)
+        rows, cols = (  # of the coarse cell in which each fine one is
+            np.minimum(np.arange(count) * fine // side, most - 1)
+            for count, most in zip(close.shape[1:], is_surface.shape, strict=True)
+        )
+        is_reached = is_surface[np.ix_(rows, cols)] & np.isfinite(close).all(axis=0)
+        if not is_reached.any():
+            continue
+        curve = close[:, is_reached].mean(axis=1)
+        weight = np.maximum(curve.mean() - curve, 0) ** 2 + 1e-30
+        place_px = weight @ near_px / weight.sum() + _still_px(grid)
+        depths.add(float(depth_of_total_disparity_mm(grid, place_px)))
+    return replace(fit, z_mm=tuple(sorted(depths)))
 
 
-def _other_orders(
-    grid: CameraGrid, order: ViewOrder, counted: bool
-) -> Iterator[tuple[ViewOrder, np.ndarray]]:
-    """Orders that differ by more than a turn of both axes, and the number (K, L) of each camera's view."""
+def _tables_of_orders(grid: CameraGrid, order: ViewOrder, counted: bool) -> dict[ViewOrder, np.ndarray]:
+    """The number of each camera's view, (K, L), in orders that differ by more than a turn of both axes."""
 
     def numbers(one: ViewOrder, rows: int, cols: int) -> np.ndarray:
         stored = (cols, rows) if one.swap_axes else (rows, cols)
         return one.arrange(np.arange(rows * cols).reshape(stored))
 
     view_of_stored = np.argsort(numbers(order, grid.rows, grid.cols), axis=None)
-    changes = ((False, False, True), (False, True, False), (False, True, True), (True, False, False))
-    for to_and_fro, swap, flip in changes:
-        other = replace(
-            order,
-            serpentine=order.serpentine ^ to_and_fro,
-            swap_axes=order.swap_axes ^ swap,
-            flip_cols=order.flip_cols ^ flip,
-        )
+    tables = {}
+    for swap, flip in ((False, False), (False, True), (True, False), (True, True)):
+        other = replace(order, swap_axes=order.swap_axes ^ swap, flip_cols=order.flip_cols ^ flip)
         shape = (grid.cols, grid.rows) if swap and not counted else (grid.rows, grid.cols)
-        yield other, view_of_stored[numbers(other, *shape)]
+        tables[other] = view_of_stored[numbers(other, *shape)]
+    return tables
 
 
 def _cell_side(images: Views | PhotonCounts, most_cells: int) -> int:
@@ -205,14 +199,14 @@ def _sweep(
     """
     from scipy.ndimage import uniform_filter
 
-    rows, cols = (np.array(evenly_chosen(count, MOST_CAMERAS)) for count in table.shape)
+    rows, cols = (np.array(evenly_chosen(count, MAX_CAMERAS)) for count in table.shape)
     images = [cells(int(table[k, l])) for k in rows for l in cols]
     steps = np.array([(k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2) for k in rows for l in cols])
     total_px = shifts_px + _still_px(grid)
     disparity = total_px[:, None] * _per_total(grid)[::-1] - np.array(grid.shear_px[::-1])  # down, right
     moves = np.floor(disparity[:, None] * steps / side + 0.5).astype(int)  # (P, V, 2)
     h, w = images[0].shape
-    fewest = max(2, LEAST_SHARE * len(images))
+    fewest = max(2, MIN_SHARE * len(images))
     variance = np.full((len(shifts_px), h, w), np.inf, np.float32)
     for plane, of_views in enumerate(moves.tolist()):
         total, squares, number = (np.zeros((h, w), np.float32) for _ in range(3))
@@ -227,7 +221,7 @@ def _sweep(
         spread = (squares - total**2 / np.maximum(number, 1)) / np.maximum(number - 1, 1)
         reached = uniform_filter(enough.astype(np.float32), WINDOW_CELLS, mode="constant")
         summed = uniform_filter(np.where(enough, np.maximum(spread, 0), 0), WINDOW_CELLS, mode="constant")
-        known = reached >= LEAST_SHARE
+        known = reached >= MIN_SHARE
         variance[plane][known] = summed[known] / reached[known]
     return variance
 
@@ -263,32 +257,4 @@ def _peaks(mass: np.ndarray) -> list[int]:
     padded = np.pad(mass, 1)
     around = padded[:-2] + padded[1:-1] + padded[2:]
     is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= PEAK_SHARE)
-    return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MOST_PEAKS]
-
-
-def _refined_depths(
-    images: Views | PhotonCounts, variance: np.ndarray, mass: np.ndarray, total_px: np.ndarray, side: int
-) -> tuple[float, ...]:
-    """Depths of the peaks, from near to far, by planes a fine cell apart around what is sharp."""
-    from scipy.ndimage import gaussian_filter1d
-
-    grid = images.grid
-    fine = min(_cell_side(images, FINE_CELLS), side)
-    active = np.convolve(mass >= PEAK_SHARE / 4, [1, 1, 1], "same") > 0
-    planes = np.unique(np.concatenate([total_px[active] + step for step in np.arange(0, side, fine / 2)]))
-    table = np.arange(grid.view_count).reshape(grid.rows, grid.cols)
-    close = _sweep(_cells_of(images, fine), table, grid, planes - _still_px(grid), fine)
-    contrast, _ = _sharpness(close)
-    is_sharp = active[variance.argmin(axis=0)] & _sharpness(variance)[1]
-    of_fine = (
-        np.minimum(np.arange(size) * fine // side, most - 1)
-        for size, most in zip(contrast.shape, is_sharp.shape, strict=True)
-    )
-    weight = np.where(is_sharp[np.ix_(*of_fine)], contrast, 0)
-    fine_mass = gaussian_filter1d(_by_plane(close, weight), BLUR_PLANES, mode="constant")
-    depths = []
-    for peak in _peaks(fine_mass):
-        near = slice(max(peak - 2, 0), peak + 3)
-        px = (fine_mass[near] * planes[near]).sum() / fine_mass[near].sum()
-        depths.append(float(depth_of_total_disparity_mm(grid, px)))
-    return tuple(sorted(depths))
+    return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MAX_PEAKS]

@@ -9,7 +9,6 @@ bits beyond the last pixel are 0. Blocks of a file without a set bit are not wri
 read as zeros and take no room on the disk.
 """
 
-import itertools
 import json
 from collections.abc import Callable
 from dataclasses import asdict
@@ -39,9 +38,6 @@ from pcii.types.truth import OPTIONAL_MAPS, Truth
 Format = Literal["hci", "nerfstudio", "photoncube", "events"]
 ARCHIVE = "events.npz"
 FRAMES = "frames.npy"
-BLOCK_BYTES = 4096
-"""Size of the blocks of a file system, which take room as a whole. A larger one would fill holes with zeros,
-a smaller one would only write more often."""
 
 
 def export_dataset(
@@ -173,27 +169,12 @@ def _binary_frames(dataset: Dataset) -> tuple[FrameEvents, int]:
 def _write_frames(
     path: Path, shape: tuple[int, int, int], frame: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> None:
-    """Write frames (T, H, W) in which the pixels (i, j) of `frame` are set, block by block.
-
-    Not through a memory map, in which a full disk ends the process without a word.
-    """
+    """Write frames (T, H, W) in which the pixels (i, j) of `frame` are set; the rest of the file is holes."""
     frame_count, height, width = shape
-    row_bytes = -(-width // 8)
-    with path.open("wb") as file:
-        header = {"descr": "|u1", "fortran_order": False, "shape": (frame_count, height, row_bytes)}
-        np.lib.format.write_array_header_1_0(file, header)
-        begin = file.tell()
-        position = begin + (frame.astype(np.int64) * height + i) * row_bytes + j // 8
-        order = np.argsort(position, kind="stable")
-        position, bit = position[order], (128 >> (j[order] % 8)).astype(np.uint8)
-        block_starts = np.flatnonzero(np.diff(position // BLOCK_BYTES, prepend=-1)).tolist()
-        for low, high in itertools.pairwise([*block_starts, position.size]):
-            start = max(int(position[low]) // BLOCK_BYTES * BLOCK_BYTES, begin)
-            block = np.zeros(BLOCK_BYTES - start % BLOCK_BYTES, np.uint8)
-            np.bitwise_or.at(block, position[low:high] - start, bit[low:high])
-            file.seek(start)
-            file.write(block.data)
-        file.truncate(begin + frame_count * height * row_bytes)
+    rows = (frame_count, height, -(-width // 8))
+    cube = np.lib.format.open_memmap(path, "w+", np.uint8, rows)
+    np.bitwise_or.at(cube, (frame, i, j // 8), (128 >> (j % 8)).astype(np.uint8))
+    cube.flush()
 
 
 WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {

@@ -80,12 +80,10 @@ def import_images(
 
 @dataclass(frozen=True, eq=False)
 class KnownViews:
-    """Views of which their files say more: depths of the virtual centre, of each view, and their range."""
+    """Views of which their files say more: depths of the virtual centre, and their range."""
 
     views: Views
     truth: Truth | None = None
-    view_z_mm: np.ndarray | None = None
-    """Planar depth of every view (K, L, H, W) float32, +inf where nothing is hit."""
     z_range_mm: tuple[float, float] | None = None
 
 

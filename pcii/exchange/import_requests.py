@@ -10,8 +10,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pcii.base.errors import InputError
 from pcii.base.progress import Report
 from pcii.exchange.count_arrays import import_arrays, import_counts
@@ -24,9 +22,9 @@ from pcii.exchange.image_folders import (
     is_picture,
 )
 from pcii.exchange.pixel_files import Encoding
-from pcii.exchange.posed_views import import_cubes, import_posed_pictures
+from pcii.exchange.posed_views import import_posed_pictures
 from pcii.exchange.stated_cameras import Optics, Tell, ViewOrder
-from pcii.exchange.transforms_file import read_transforms, transforms_in
+from pcii.exchange.transforms_file import transforms_in
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
@@ -89,7 +87,6 @@ class Imported:
     counted: bool
     """Whether views are counted one by one, not stored by row and column."""
     truth: Truth | None = None
-    view_z_mm: np.ndarray | None = None
     z_range_mm: Pair = None
 
 
@@ -100,7 +97,6 @@ READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
     import_counts: ("photon counts", ("counts",)),
     import_hci: ("a scene of the HCI 4D light field benchmark", ()),
     import_posed_pictures: ("pictures with a transforms.json", ()),
-    import_cubes: ("photon cubes with a transforms.json", ("counts", "bitpack")),
 }
 """What a reader reads, and the options that it meets without being told."""
 GROUPS: dict[str, type[Any]] = {
@@ -123,10 +119,8 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
         raise InputError(f"{source}: there is no such file or folder")
     pattern, is_counts = options["pattern"], options["counts"] or options["bitpack"]
     if pattern is None and options["lens_array"] is None:
-        transforms = transforms_in(source)
-        if transforms is not None:
-            is_packed = read_transforms(transforms, tell=lambda sentence: None).is_bitpacked
-            return import_cubes if is_packed else import_posed_pictures
+        if transforms_in(source) is not None:
+            return import_posed_pictures
         if (source / PARAMETERS).is_file():
             return import_hci
     if source.is_dir() and pattern is None:
@@ -165,7 +159,7 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
     images, known = result, {}
     if isinstance(result, KnownViews):
         images = result.views
-        known = {name: getattr(result, name) for name in ("truth", "view_z_mm", "z_range_mm")}
+        known = {name: getattr(result, name) for name in ("truth", "z_range_mm")}
     pattern, encoding = options["pattern"], values.get("encoding")
     is_counted = options["grid"] is not None or is_picture(source)
     return Imported(

@@ -1,6 +1,6 @@
 """Picture files as arrays: PNG, JPEG, TIFF, OpenEXR and PFM, and the light that their numbers stand for.
 
-Pillow, tifffile and OpenEXR read them; sizes are limited before pixels are decoded.
+Pillow, tifffile and OpenEXR read them, within their own limits of size.
 """
 
 import logging
@@ -16,8 +16,6 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.srgb import srgb_to_linear
 
-MOST_PIXELS = 1 << 27
-"""Most pixels of a picture, 134 million; larger ones are refused before they are decoded."""
 LARGEST_BYTES = 1 << 33
 """Most memory of all views together, and of all pages of a file: 8 GiB."""
 STARTS = {
@@ -92,10 +90,10 @@ def kind_of(path: Path) -> str | None:
     return next((kind for start, kind in STARTS.items() if head.startswith(start)), None)
 
 
-def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS) -> Picture:
+def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
     """The picture in a file of one of these kinds; raises `InputError`, naming the file, if it has none.
 
-    Pictures have at most `most_pixels` pixels, and one or three channels beside alpha.
+    Pictures have one or three channels beside alpha.
     """
     readers = {"TIFF": _read_tiff, "EXR": _read_exr}
     try:
@@ -103,7 +101,7 @@ def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS)
         if kind is None or kind not in kinds:
             names = " or ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
             raise InputError(f"not a{'n' * names.startswith('E')} {names} picture")
-        picture = readers.get(kind, _read_pillow)(path, most_pixels)
+        picture = readers.get(kind, _read_pillow)(path)
         if picture.shape[2] not in (1, 3):
             raise InputError(f"has {picture.shape[2]} channels; expected 1 or 3")
     except InputError as fault:
@@ -189,17 +187,11 @@ def check_encoding(encoding: Any) -> None:
         )
 
 
-def _check_pixels(height: int, width: int, most_pixels: int) -> None:
-    if height * width > most_pixels:
-        raise InputError(f"has {height} x {width} px, and at most {most_pixels} pixels are decoded")
-
-
-def _read_pillow(path: Path, most_pixels: int) -> Picture:
+def _read_pillow(path: Path) -> Picture:
     from PIL import Image
 
     warning_off = warnings.catch_warnings(action="ignore")
     with warning_off, Image.open(path, formats=("PNG", "JPEG", "PPM")) as image:
-        _check_pixels(image.height, image.width, most_pixels)
         stored = str(image.tile[0].args) if image.format == "PNG" else ""
         if image.mode not in PILLOW_MODES or stored in ("L;2", "L;4"):
             raise InputError(f"a {stored or image.mode} picture; save it as RGB or 8-bit grey")
@@ -222,7 +214,7 @@ def _read_pillow(path: Path, most_pixels: int) -> Picture:
     return Picture(path, pixels, alpha, None, orientation, unused)
 
 
-def _read_tiff(path: Path, most_pixels: int) -> Picture:
+def _read_tiff(path: Path) -> Picture:
     """All frames: also of a file with one header for many, as ImageJ writes large stacks."""
     from tifffile import TiffFile
 
@@ -231,7 +223,6 @@ def _read_tiff(path: Path, most_pixels: int) -> Picture:
         series: list[Any] = list(file.series)
         page = series[0].keyframe
         height, width, samples = page.imagelength, page.imagewidth, page.samplesperpixel
-        _check_pixels(height, width, most_pixels)
         kind = getattr(page.photometric, "name", page.photometric)
         if kind not in TIFF_KINDS:
             raise InputError(f"a TIFF picture of the kind {kind}; save it as RGB or grey")
@@ -265,7 +256,7 @@ def _profile(content: bytes | None) -> str:
     return "" if not content or b"sRGB" in content.replace(b"\0", b"") else "the colour profile"
 
 
-def _read_exr(path: Path, most_pixels: int) -> Picture:
+def _read_exr(path: Path) -> Picture:
     import OpenEXR
 
     with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True, header_only=True) as file:
@@ -276,8 +267,6 @@ def _read_exr(path: Path, most_pixels: int) -> Picture:
         )
     if window != display:
         raise InputError("its data window is not its display window; save the whole picture")
-    left, top, right, bottom = map(int, window)
-    _check_pixels(bottom - top + 1, right - left + 1, most_pixels)
     with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
         channels = file.parts[0].channels
         colours = "RGB" if {*"RGB"} <= {*channels} else "Y"

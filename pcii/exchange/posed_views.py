@@ -1,29 +1,24 @@
-"""Pictures and photon cubes with the poses of their cameras, which have to be of one plane grid.
+"""Pictures with the poses of their cameras, which have to be of one plane grid.
 
 The frames of a transforms.json may be in any order and the rig anywhere in the world: right and down are
 those of the pictures.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.exchange.count_arrays import add_frames, frames_of_files, map_array
-from pcii.exchange.export_pictures import DEPTH_UNIT_M, MM_PER_M
-from pcii.exchange.image_folders import KnownViews, pictures_of, radiance_of_views, views_of
-from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of
+from pcii.exchange.export_pictures import MM_PER_M
+from pcii.exchange.image_folders import pictures_of, radiance_of_views, views_of
+from pcii.exchange.pixel_files import Encoding, check_encoding, decode
 from pcii.exchange.stated_cameras import Tell, warn
 from pcii.exchange.transforms_file import MOST_PX, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.types.images import Views
 
-MOST_CAMERAS = 1000
-"""All pairs of rows, and of columns, are compared: half a million of a single row."""
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
 what is nearer is seen by at most four cameras of a row. Their depth is focal length in px x pitch /
@@ -36,7 +31,7 @@ DIGITS = 9
 USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
 ROUNDING = 1e-9
-"""Of numbers of poses that are equal: metres, or parts of a rotation."""
+"""Of numbers that are equal: metres, parts of a rotation, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +59,8 @@ def import_posed_pictures(
     cfa: str | None = None,
     report: Report = silent,
     tell: Tell = warn,
-) -> KnownViews:
-    """Views, cameras and depths of a transforms.json, whose poses are of one plane grid of parallel cameras.
+) -> Views:
+    """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
 
     The file tells the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
     says how large the film is. Whole numbers are sRGB and floats linear, unless `encoding` says otherwise;
@@ -74,8 +69,6 @@ def import_posed_pictures(
     """
     check_encoding(encoding)
     file = read_transforms(source, tell=tell)
-    if file.is_stack:
-        raise InputError(f"{file.path}: file_path: expected one in each frame; it is of all frames")
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
     files = np.array(file.file_paths, object)[poses.numbers]
@@ -86,61 +79,7 @@ def import_posed_pictures(
             f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "
             f"{grid.height} x {grid.width}, rows x columns"
         )
-    view_z_mm = _depths(file, poses, tell)
-    truth = None
-    if view_z_mm is not None and grid.rows % 2 and grid.cols % 2:  # the middle view is the virtual centre
-        middle = view_z_mm[grid.rows // 2, grid.cols // 2]
-        truth = Truth(middle, np.zeros(middle.shape, np.int16), {})
-    return KnownViews(views_of(radiance, grid, cfa), truth, view_z_mm)
-
-
-def import_cubes(
-    source: str | Path,
-    *,
-    focal_mm: float | None = None,
-    pixel_mm: float | None = None,
-    sensor_mm: float | None = None,
-    cfa: str | None = None,
-    frames: tuple[int, int] | None = None,
-    report: Report = silent,
-    tell: Tell = warn,
-) -> PhotonCounts:
-    """Photon counts of the photon cubes of a transforms.json that says `bitpack`.
-
-    Of a grid it has a frame for each camera, whose `file_path` is a cube (T, H, W / 8). Of one camera it is a
-    dataset of visionsim: one cube, and a pose for each of its frames, which must be alike. `frames` are the
-    first and the last to add up; `cfa` is the Bayer pattern where the file says none. Raises `InputError`,
-    naming file and member, for cameras that are no grid, and cubes that do not fit what the file says.
-    """
-    file = read_transforms(source, tell=tell)
-    document = file.document
-    if document.bitpack_dim != 2 or document.c not in (None, 1):
-        raise InputError(
-            f"{file.path}: bitpack_dim, c: expected 2 and 1: one channel, packed along the width"
-        )
-    pattern = None if document.cfa == "none" else document.cfa
-    if pattern is not None and cfa not in (None, pattern):
-        raise InputError(f"{file.path}: cfa: is {pattern}; leave out --cfa")
-    cameras = file
-    if file.is_stack:
-        if np.ptp(file.poses, axis=0).max() + np.ptp(file.centres_px, axis=0).max() > ROUNDING:
-            raise InputError(f"{file.path}: frames: the camera moves, and a moving camera is no grid")
-        cameras = replace(file, poses=file.poses[:1], centres_px=file.centres_px[:1])
-    poses = find_grid(cameras)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
-    stacks = frames_of_files(np.array(file.file_paths, object)[poses.numbers])
-    first = stacks[0, 0].load()
-    for number in (document.num_frames, len(file.poses) if file.is_stack else None):
-        if number not in (None, len(first)):
-            raise InputError(f"{file.path}: frames: says {number}, and {stacks[0, 0].name} has {len(first)}")
-
-    def stated_grid(shape: tuple[int, ...]) -> CameraGrid:
-        if shape != grid.shape_KLHW:
-            raise InputError(f"{stacks[0, 0].name}: is {shape[2]} px high, and h is {grid.height}")
-        return grid
-
-    options = {"frames": frames, "cfa": pattern or cfa, "report": report, "tell": tell}
-    return add_frames(stacks, stated_grid, bitpack=True, width=grid.width, **options)
+    return views_of(radiance, grid, cfa)
 
 
 def camera_grid_of(
@@ -188,81 +127,65 @@ def camera_grid_of(
 
 
 def find_grid(file: TransformsFile) -> PoseGrid:
-    """The grid of the frames of a file, in whichever order they are.
+    """The grid of the frames of a file, in whichever order they are, fitted by least squares.
 
-    Raises `InputError` with the frame and by how much it is off: a camera that is turned, or not in its
-    place; a place without a camera, or with two; a principal point that is not linear in the camera's place.
+    Raises `InputError` for cameras that are no such grid, with the frame that is off most.
     """
-    count = len(file.poses)
-    if count > MOST_CAMERAS:
-        raise InputError(f"{file.path}: frames: {count} cameras, and a grid has at most {MOST_CAMERAS}")
     place_mm = _places_in_common_frame(file)
-    apart = _nearest_mm(place_mm) / 4
-    if apart == 0:
-        raise InputError(f"{file.path}: frames: most cameras are at the same place as another one")
-    (x0, step_x, cols, col_of), (y0, step_y, rows, row_of) = (
-        _lattice_of(places, apart) for places in place_mm[:2]
-    )
-    pitch = step_x or step_y or 1.0, step_y or step_x or 1.0
-    off_mm = np.stack([place_mm[0] - x0 - step_x * col_of, place_mm[1] - y0 - step_y * row_of, place_mm[2]])
+    col, row = (_groups_of(values, _nearest_mm(place_mm) / 4) for values in place_mm[:2])
+    count, cols, rows = len(file.poses), col.max() + 1, row.max() + 1
+    numbers = np.full((rows, cols), -1)
+    numbers[row, col] = np.arange(count)
+    if count != numbers.size or numbers.min() < 0:
+        loneliest = np.argmin(np.bincount(col)[col] * np.bincount(row)[row])
+        raise InputError(
+            f"{file.path}: frames: {count} cameras do not stand one at each place of a plane grid, here of "
+            f"{rows} x {cols}; {file.frame_name(int(loneliest))} has the fewest in line with it"
+        )
+    steps = col - (cols - 1) / 2, row - (rows - 1) / 2, np.zeros(count)
+    places = [_fit_line(step, values) for step, values in zip(steps, place_mm, strict=True)]
+    pitch = places[0][1] or places[1][1] or 1.0, places[1][1] or places[0][1] or 1.0
+    off_mm = np.stack([off for *_, off in places])
     side_px = max(file.width, file.height)
     nearest_mm = file.focal_px * min(pitch) / (NEAREST_SHARE * side_px)
     moved_px = (file.focal_px * np.hypot(*off_mm[:2]) + side_px / 2 * np.abs(off_mm[2])) / nearest_mm
-    worst = int(np.argmax(moved_px))
-    if count > 1 and moved_px[worst] > MOST_PX:
-        right, down, forward = np.round(off_mm[:, worst], 9) + 0.0  # no -0
-        raise InputError(
-            f"{file.path}: {file.frame_name(worst)} is {np.linalg.norm(off_mm[:, worst]):.3g} mm from its "
-            f"place in a plane grid of {rows} x {cols} cameras, {right:.3g} to the right, {down:.3g} down, "
-            f"{forward:.3g} forward; that moves near points by {moved_px[worst]:.2g} px, and {MOST_PX:g} is "
-            "allowed"
-        )
-    numbers = np.full((rows, cols), -1)
-    numbers[row_of, col_of] = np.arange(count)
-    twice = np.flatnonzero(numbers[row_of, col_of] != np.arange(count))
-    if twice.size:
-        names = (file.frame_name(int(n)) for n in (twice[0], numbers[row_of, col_of][twice[0]]))
-        raise InputError(f"{file.path}: {' and '.join(names)} are at the same place of the grid")
-    if count < numbers.size:
-        k, l = np.argwhere(numbers < 0)[0].tolist()
-        raise InputError(
-            f"{file.path}: frames: no camera at ({k}, {l}) (row from the top, column from the left) of a "
-            f"grid of {rows} x {cols}, where {count} have one; every place of the grid needs a picture"
-        )
-    (shear_x, offset_x), (shear_y, offset_y) = _centres(file, (col_of, row_of), (cols, rows))
+    _check_moved(file, moved_px, np.linalg.norm(off_mm, axis=0), "mm from its place in a plane grid")
+    from_middle = (file.centres_px - np.array([file.width, file.height]) / 2).T
+    centres = [_fit_line(step, values) for step, values in zip(steps[:2], from_middle, strict=True)]
+    off_px = np.hypot(centres[0][2], centres[1][2])
+    _check_moved(file, off_px, off_px, "px from where cx and cy of a grid with one shear would be")
+    (offset_x, shear_x, _), (offset_y, shear_y, _) = centres
     return PoseGrid(
         numbers,
         pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
-        shear_px=(shear_x, shear_y),
-        offset_px=(offset_x, offset_y),
+        shear_px=(_digits(shear_x), _digits(shear_y)),
+        offset_px=(_digits(offset_x), _digits(offset_y)),
     )
 
 
 def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
-    """Places (3, N) in mm to the right, down and forward in the common orientation of the cameras.
-
-    That is the rotation nearest to the median of all matrices, element by element: a few cameras that are
-    turned do not move it, so that the angle in the message is their own.
-    """
+    """Places (3, N) in mm to the right, down and forward in the mean orientation of the cameras."""
     turns = file.poses[:, :3, :3]
-    left, _, right = np.linalg.svd(np.median(turns, axis=0))
+    left, _, right = np.linalg.svd(turns.mean(axis=0))
     common = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     # |A - B| of two rotations is 2 sqrt(2) sin(angle / 2), exact for small angles too.
     chord = np.linalg.norm(turns - common, axis=(1, 2)) / np.sqrt(8)
     angle = 2 * np.arcsin(np.minimum(chord, 1))
     corner_px = np.hypot(file.width, file.height) / 2
     moved_px = angle * (file.focal_px + corner_px**2 / file.focal_px)
+    _check_moved(file, moved_px, np.degrees(angle), "degrees turned from the mean orientation")
+    place_mm = MM_PER_M * (file.poses[:, :3, 3] - file.poses[:, :3, 3].mean(axis=0))
+    return (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
+
+
+def _check_moved(file: TransformsFile, moved_px: np.ndarray, off: np.ndarray, what: str) -> None:
+    """Refuse the camera that moves points most, if that is more than `MOST_PX`."""
     worst = int(np.argmax(moved_px))
     if moved_px[worst] > MOST_PX:
-        limit = np.degrees(angle[worst] * MOST_PX / moved_px[worst])
         raise InputError(
-            f"{file.path}: {file.frame_name(worst)} is turned by {np.degrees(angle[worst]):.3g} degrees "
-            f"from the common orientation; cameras of a grid are parallel, to {limit:.2g} degrees here"
+            f"{file.path}: {file.frame_name(worst)} is {off[worst]:.3g} {what}; that moves points by "
+            f"{moved_px[worst]:.2g} px, and {MOST_PX:g} is allowed"
         )
-    place_mm = MM_PER_M * (file.poses[:, :3, 3] - np.median(file.poses[:, :3, 3], axis=0))
-    place_mm = (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
-    place_mm[2] -= np.median(place_mm[2])
-    return place_mm
 
 
 def _nearest_mm(place_mm: np.ndarray) -> float:
@@ -275,84 +198,19 @@ def _nearest_mm(place_mm: np.ndarray) -> float:
     return float(np.median(np.asarray(distances)[:, 1]))
 
 
-def _lattice_of(values: np.ndarray, apart: float) -> tuple[float, float, int, np.ndarray]:
-    """Evenly spaced numbers: the first, the step (0 of one), how many, and which of them each value (N,) is.
-
-    Values closer than `apart` are of one place. Places with less than half as many values as the fullest one
-    are left out of the fit, so that few values that are wrong move no other.
-    """
-    ordered = np.sort(values)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
-    fullest = max(map(len, groups))
-    centres = np.array([np.median(group) for group in groups if 2 * len(group) >= fullest])
-    if centres.size == 1:
-        return float(centres[0]), 0.0, 1, np.zeros(len(values), np.int64)
-    gaps = np.diff(centres)
-    usual = np.quantile(gaps, 0.5, method="lower")
-    number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / usual), 1))])
-    origin, step = _line_through(number, centres)
-    count = int(number[-1]) + 1
-    return origin, step, count, np.clip(np.rint((values - origin) / step), 0, count - 1).astype(np.int64)
+def _groups_of(values: np.ndarray, apart: float) -> np.ndarray:
+    """Number (N,) of the group of each value; groups have gaps of more than `apart` between them."""
+    order = np.argsort(values)
+    groups = np.empty(values.size, np.int64)
+    groups[order] = np.cumsum(np.diff(values[order], prepend=values.min()) > apart)
+    return groups
 
 
-def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Value at x = 0 and slope of a line: medians over all pairs of points (Theil 1950, Sen 1968).
-
-    It stays as it is if less than 29 % of the points are wrong.
-    """
-    from scipy.stats import theilslopes
-
-    line: Any = theilslopes(y, x, method="joint")
-    return float(line.intercept), float(line.slope)
-
-
-def _centres(
-    file: TransformsFile, index: tuple[np.ndarray, np.ndarray], counts: tuple[int, int]
-) -> list[tuple[float, float]]:
-    """Shear and offset in px, each of x and of y; refuses what is not linear in the camera's place."""
-    lines, off = [], np.zeros((2, len(index[0])))
-    for axis, side in enumerate((file.width, file.height)):
-        from_middle = file.centres_px[:, axis] - side / 2
-        typical = np.array([np.median(from_middle[index[axis] == number]) for number in range(counts[axis])])
-        steps = np.arange(counts[axis]) - (counts[axis] - 1) / 2
-        offset, shear = _line_through(steps, typical) if counts[axis] > 1 else (float(typical[0]), 0.0)
-        off[axis] = from_middle - (offset + shear * steps[index[axis]])
-        lines.append(tuple(0.0 if abs(v) < 1e-12 * side else _digits(v) for v in (shear, offset)))
-    off_px = np.hypot(*off)
-    worst = int(np.argmax(off_px))
-    if off_px[worst] > MOST_PX:
-        raise InputError(
-            f"{file.path}: {file.frame_name(worst)}: its principal point (cx, cy) is {off_px[worst]:.3g} px "
-            "from where those of the others put it; from camera to camera it moves by one shear"
-        )
-    return lines
+def _fit_line(step: np.ndarray, values: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Mean, slope and residuals of values (N,) over steps, whose mean is 0, by least squares."""
+    slope = float(step @ values / max(step @ step, 0.5))
+    return float(values.mean()), slope, values - values.mean() - slope * step
 
 
 def _digits(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
-
-
-def _depths(file: TransformsFile, poses: PoseGrid, tell: Tell) -> np.ndarray | None:
-    """Depth of every view in mm; None, which is told, if it is not known of all."""
-    paths = [path for path in file.depth_paths if path is not None]
-    if not paths:
-        return None
-    if len(paths) < poses.numbers.size or not {path.suffix for path in paths} <= {".npy", ".png", ".tif"}:
-        tell("not used: depth_file_path; expected a .npy, .png or .tif file of every frame")
-        return None
-    unit_mm = MM_PER_M * (file.document.depth_unit_scale_factor or DEPTH_UNIT_M)
-    depths = np.empty((*poses.numbers.shape, file.height, file.width), np.float32)
-    for camera, path in np.ndenumerate(np.array(paths, object)[poses.numbers]):
-        is_array = path.suffix == ".npy"
-        numbers = map_array(path)[..., None] if is_array else next(decode(picture_of(path, ("PNG", "TIFF"))))
-        if numbers.dtype.kind not in "fu" or numbers.shape != (*depths.shape[2:], 1):
-            raise InputError(
-                f"{path}: expected {file.height} x {file.width} numbers, got {numbers.dtype} {numbers.shape}"
-            )
-        with np.errstate(over="ignore"):
-            z_mm = numbers[..., 0].astype(np.float32) * np.float32(unit_mm)
-        if not (z_mm >= 0).all():
-            raise InputError(f"{path}: holds NaN or depths below 0")
-        depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
-    tell(f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit")
-    return depths
+    return float(f"{value:.{DIGITS}g}") if abs(value) > ROUNDING else 0.0

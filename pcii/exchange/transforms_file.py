@@ -1,8 +1,7 @@
-"""The file transforms.json of neural reconstruction (nerfstudio, Instant NGP, visionsim), read and checked.
+"""The file transforms.json of neural reconstruction (nerfstudio, Instant NGP), read and checked.
 
-The format is that of nerfstudio (docs/quickstart/data_conventions.md of its repository) and of Instant NGP;
-visionsim's photon cubes have one file of pictures for all frames, `file_path` at the top. Cameras have the
-axes of OpenGL: X right, Y up, looking along -Z, in metres.
+The format is that of nerfstudio (docs/quickstart/data_conventions.md of its repository) and of Instant NGP.
+Cameras have the axes of OpenGL: X right, Y up, looking along -Z, in metres.
 """
 
 import json
@@ -10,7 +9,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -62,23 +61,16 @@ class _Lens(BaseModel):
     p1: Number = 0
     p2: Number = 0
     distortion_params: list[Number] | None = None
-    file_path: str | None = None
 
 
 class _Frame(_Lens):
-    depth_file_path: str | None = None
+    file_path: str | None = None
     transform_matrix: list[list[Number]]
 
 
 class _Document(_Lens):
     frames: Annotated[list[_Frame], Field(min_length=1, max_length=MOST_POSES)]
     applied_scale: Positive = None
-    depth_unit_scale_factor: Positive = None
-    bitpack: bool | None = None
-    bitpack_dim: int | None = None
-    c: int | None = None
-    num_frames: int | None = None
-    cfa: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +78,6 @@ class TransformsFile:
     """What the file says of its N frames, which are in the order of the file."""
 
     path: Path
-    document: Any
-    """The members at the top, by their names: also those of photon cubes and depths."""
     poses: np.ndarray
     """Camera-to-world matrices (N, 4, 4), float64: axes of OpenGL, metres; rotations are exact ones."""
     centres_px: np.ndarray
@@ -96,23 +86,10 @@ class TransformsFile:
     width: int
     height: int
     file_paths: tuple[Path, ...]
-    """Picture of each frame; of a file with one for all frames, that one alone."""
-    depth_paths: tuple[Path | None, ...]
-
-    @property
-    def is_bitpacked(self) -> bool:
-        """Whether the pictures are photon cubes: eight binary pixels in a byte."""
-        return self.document.bitpack is True
-
-    @property
-    def is_stack(self) -> bool:
-        """Whether one file has the pictures of all frames, in their order."""
-        return self.document.file_path is not None
+    """Picture of each frame."""
 
     def frame_name(self, number: int) -> str:
-        """What messages call a frame: the path of its picture or, without one, its place in the list."""
-        if self.is_stack:
-            return f"frames.{number}"
+        """What messages call a frame: the path of its picture."""
         return visible(self.file_paths[number].relative_to(self.path.parent).as_posix())
 
 
@@ -135,20 +112,11 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     file = transforms_in(Path(path)) or Path(path)
     document = _parsed(file)
     frames = document.frames
-    if document.file_path is None:
-        paths = [_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in enumerate(frames)]
-    else:
-        paths = [_path(file, "file_path", document.file_path)]
-    depths = [
-        _path(file, f"frames.{n}.depth_file_path", frame.depth_file_path) if frame.depth_file_path else None
-        for n, frame in enumerate(frames)
-    ]
+    paths = [_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in enumerate(frames)]
     if len({*paths}) < len(paths):
         name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
         raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
     if None in (document.w or frames[0].w, document.h or frames[0].h):
-        if paths[0].suffix == ".npy":
-            raise InputError(f"{file}: w, h: missing; the size of the pictures in pixels")
         document.h, document.w, _ = picture_of(paths[0], VIEWS).shape
     lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(frames)]
     width, height, focal_px, _ = lenses[0]
@@ -165,14 +133,12 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
         tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
         path=file,
-        document=document,
         poses=poses,
         centres_px=np.array([centre for *_, centre in lenses]),
         focal_px=focal_px,
         width=width,
         height=height,
         file_paths=tuple(paths),
-        depth_paths=tuple(depths),
     )
 
 

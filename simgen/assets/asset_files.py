@@ -23,7 +23,6 @@ from simgen.assets.triangles import Triangles, fan_all
 from simgen.base.file_lookup import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
 from simgen.base.strict_models import shorten
 
-MOST_TEXTURE_PIXELS = 1 << 26
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _FACES = ("vertex_indices", "vertex_index")
 _LEFT_OUT = {"", "mtllib", "usemtl", "o", "g", "s", "mg", "l", "p", "vp", "lod", "usemap", "maplib"}
@@ -81,7 +80,7 @@ def read_texture(path: Path, *, for_gltf: bool = False) -> np.ndarray:
     Raises `InputError` for a file that is no single RGB, grey or palette picture, or is not opaque. For glTF
     opacity is a fourth channel if the file has it, and EXIF is ignored, as in Blender.
     """
-    picture = picture_of(path, ("PNG", "JPEG", "TIFF"), MOST_TEXTURE_PIXELS)
+    picture = picture_of(path, ("PNG", "JPEG", "TIFF"))
     if picture.pages != 1 or picture.dtype.kind == "f":
         raise InputError(f"{path}: has {picture.layout()}; save one page as RGB or grey of 8 or 16 bits")
     (pixels,) = decode(picture, turn=None if for_gltf else True, alpha=for_gltf)

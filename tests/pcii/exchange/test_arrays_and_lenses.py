@@ -107,19 +107,13 @@ def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Pat
     assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
 
-@pytest.mark.parametrize("kept", [".npy", ".npz", "array"])
+@pytest.mark.parametrize("kept", [".npy", "array"])
 def test_arrays_come_in(tmp_path: Path, kept: str) -> None:
     light = np.random.default_rng(1).random((2, 3, H, W, 3))
     source = tmp_path / f"a{kept}"
     if kept == ".npy":
         np.save(source, light)
-    elif kept == ".npz":
-        np.savez_compressed(source, light=light, other=light[..., 0])
-        other = import_arrays(source, OPTICS, array="other", order=ViewOrder(flip_rows=True))
-        np.testing.assert_allclose(np.asarray(other.radiance)[1], light[0, ..., :1], rtol=1e-6)
-    views = import_arrays(
-        light if kept == "array" else source, OPTICS, array="light" if kept == ".npz" else None
-    )
+    views = import_arrays(light if kept == "array" else source, OPTICS)
     np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
     flat = light.reshape(6, H, W, 3)
     counted = import_arrays(flat, OPTICS, grid=(2, 3))

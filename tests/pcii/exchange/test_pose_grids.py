@@ -1,5 +1,6 @@
 """The grid behind poses: found in any order and place, or refused with the camera and how far off it is."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -75,71 +76,44 @@ def test_shear_and_a_common_principal_point_are_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("off_mm", "told"),
+    ("off_mm", "words"),
     [
-        (
-            (2, 0, 0),
-            "is 2 mm from its place in a plane grid of 3 x 4 cameras, 2 to the right, 0 down, 0 forward",
-        ),
-        (
-            (0, 1, 0),
-            "is 1 mm from its place in a plane grid of 3 x 4 cameras, 0 to the right, -1 down, 0 forward",
-        ),
-        (
-            (0, 0, -3),
-            "is 3 mm from its place in a plane grid of 3 x 4 cameras, 0 to the right, 0 down, 3 forward",
-        ),
-        ((0.004, 0, 0), "is 0.004 mm from its place"),
-        ((500, 0, 0), "is 490 mm from its place"),  # of the last column
+        ((2, 0, 0), "has the fewest in line with it"),
+        ((0, 500, 0), "has the fewest in line with it"),
+        ((0.8, 0, 0), r"is 0\.7\d* mm from its place in a plane grid"),
+        ((0, 0, -3), r"is 2\.7\d* mm from its place in a plane grid"),
+        ((0.004, 0, 0), r"is 0\.003\d* mm from its place.* and 0\.1 is allowed"),
     ],
 )
-def test_a_camera_out_of_its_place_is_named_with_the_distance(tmp_path: Path, off_mm, told) -> None:
+def test_a_camera_out_of_its_place_is_named(tmp_path: Path, off_mm, words) -> None:
+    """A fit of 12 cameras follows one that is off by a tenth of that."""
     frames = frames_of(3, 4)
     moved(frames[5], *off_mm)
     file = read(tmp_path, frames)
-    assert f"images/1_1.png {told}" in one_sentence(lambda: find_grid(file), file.path)
+    assert re.search(f"images/1_1.png {words}", one_sentence(lambda: find_grid(file), file.path))
 
 
 def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
     """The nearest point moves by 640 / 4 px from camera to camera: 0.1 px are 1 / 1600 of 4 mm of pitch."""
     frames = frames_of(3, 4)
     moved(frames[5], 0.9 * MOST_PX / 160 * 4, 0, 0)
-    assert find_grid(read(tmp_path, frames)).pitch_mm == (5, 4)
-    moved(frames[5], 0.2 * MOST_PX / 160 * 4, 0, 0)
-    file = read(tmp_path, frames)
-    assert "and 0.1 is allowed" in one_sentence(lambda: find_grid(file), file.path)
+    turned(frames[5], about_y(0.004))  # a point in a corner moves by less than 0.1 px
+    assert find_grid(read(tmp_path, frames)).pitch_mm == pytest.approx((5, 4), rel=1e-4)
 
 
 def test_a_turned_camera_is_named_with_the_angle(tmp_path: Path) -> None:
     frames = frames_of(3, 3, turn=SOMEWHERE)
     turned(frames[4], about_y(2.5))
     file = read(tmp_path, frames)
-    told = one_sentence(lambda: find_grid(file), file.path)
-    assert "images/1_1.png is turned by 2.5 degrees from the common orientation" in told
-    # Of 0.004 degrees a point in the middle moves by 0.07 px, one in a corner by less than 0.1.
-    frames = frames_of(3, 3)
-    turned(frames[4], about_y(0.004))
-    find_grid(read(tmp_path, frames))
+    assert "images/1_1.png is 2.22 degrees turned" in one_sentence(lambda: find_grid(file), file.path)
 
 
-def test_places_without_a_camera_are_named(tmp_path: Path) -> None:
-    frames = frames_of(3, 4)
-    file = read(tmp_path, frames[:6] + frames[7:])
-    assert "no camera at (1, 2) (row" in one_sentence(lambda: find_grid(file), file.path)
-    file = read(tmp_path, frames[1:-1])
-    assert "no camera at (0, 0) (row" in one_sentence(lambda: find_grid(file), file.path)
-    diagonal = read(tmp_path, [frames[0], frames[5]])
-    assert "no camera at (0, 1)" in one_sentence(lambda: find_grid(diagonal), diagonal.path)
-
-
-def test_two_cameras_at_one_place_are_named(tmp_path: Path) -> None:
-    frames = frames_of(2, 3)
-    file = read(tmp_path, [*frames, frames[2] | {"file_path": "again.png"}])
-    told = one_sentence(lambda: find_grid(file), file.path)
-    assert "images/0_2.png and again.png are at the same place" in told
-    same = [frames[0] | {"file_path": f"{n}.png"} for n in range(3)]
-    file = read(tmp_path, same)
-    assert "same place" in one_sentence(lambda: find_grid(file), file.path)
+@pytest.mark.parametrize("numbers", [(0, 1, 2, 3, 4), (0, 4), (0, 1, 2, 3, 4, 5, 2), (0, 1, 2, 3, 4, 1)])
+def test_every_place_has_one_camera(tmp_path: Path, numbers) -> None:
+    frames = [frames_of(2, 3)[n] | {"file_path": f"{count}.png"} for count, n in enumerate(numbers)]
+    file = read(tmp_path, frames)
+    words = f"frames: {len(numbers)} cameras do not stand one at each place of a plane grid"
+    assert words in one_sentence(lambda: find_grid(file), file.path)
 
 
 def test_a_principal_point_that_is_no_shear_is_named(tmp_path: Path) -> None:
@@ -147,7 +121,7 @@ def test_a_principal_point_that_is_no_shear_is_named(tmp_path: Path) -> None:
     frames[7]["cx"] = 321.5
     file = read(tmp_path, frames)
     told = one_sentence(lambda: find_grid(file), file.path)
-    assert "images/2_1.png: its principal point (cx, cy) is 1.5 px from" in told
+    assert "images/2_1.png is 1.33 px from where cx and cy" in told
 
 
 @pytest.mark.parametrize(

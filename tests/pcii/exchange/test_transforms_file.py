@@ -82,7 +82,6 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
         ({"p2": -1e-7}, "frames.0: the lens distorts"),
         ({"is_fisheye": True}, "frames.0: the lens distorts"),
         ({"camera_model": "OPENCV_FISHEYE"}, "camera_model: expected one of OPENCV"),
-        ({"file_path": "../frames.npy"}, "file_path: expected a path inside the folder"),
     ],
 )
 def test_members_at_the_top_that_are_wrong_are_named(tmp_path: Path, top, told) -> None:
@@ -147,7 +146,7 @@ def test_one_member_of_any_kind_gives_a_grid_or_one_sentence(tmp_path_factory, d
     place = data.draw(
         st.sampled_from([document, frame, *frame["transform_matrix"], frame["transform_matrix"]])
     )
-    names = list(range(len(place))) if isinstance(place, list) else [*place, "cx", "k1", "bitpack"]
+    names = list(range(len(place))) if isinstance(place, list) else [*place, "cx", "k1"]
     place[data.draw(st.sampled_from(names))] = data.draw(ODD)
     path = tmp_path_factory.mktemp("odd") / "transforms.json"
     path.write_text(json.dumps(document))
