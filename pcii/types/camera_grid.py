@@ -7,7 +7,7 @@ from typing import TypeGuard
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.types.arrays import Drawn, is_whole
+from pcii.types.arrays import is_whole
 
 
 def _is_finite(value: object) -> TypeGuard[float]:
@@ -16,7 +16,7 @@ def _is_finite(value: object) -> TypeGuard[float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraGrid(Drawn):
+class CameraGrid:
     """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
 
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
