@@ -367,10 +367,6 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         table[f"reconstruct, photons{name}"] = ("reconstruct", _sections_of_counts(options))
     for name, options in OPTIONS.items():
         table[f"reconstruct, radiance{name}"] = ("reconstruct", _sections_of_views(options))
-    table["reconstruct_each"] = (
-        "reconstruct_each",
-        lambda case: list(pcii.reconstruct_each(case.views(cfa="GRBG"), case.z_mm)),
-    )
     for method in ("laroche-prescott", "bilinear", "malvar", "menon"):
         table[f"demosaic, {method}"] = (
             "demosaic",

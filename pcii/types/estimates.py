@@ -52,11 +52,6 @@ class Segmented(Drawn):
         """Depths of the sections (Z,) float64."""
         return self.sections.z_mm
 
-    @property
-    def cleaned(self) -> np.ndarray:
-        """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
-        return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DepthMap(Drawn):

@@ -9,7 +9,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.short_form import times
 from pcii.types.arrays import Drawn, read_only, whole_counts
-from pcii.types.bayer import channel_count, check_cfa, colour_cells, colours_and_samples
+from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_events import (
     PLAIN,
@@ -196,12 +196,6 @@ class PhotonCounts(Drawn):
     def channel_count(self) -> int:
         """Number of colours of sections of these counts: 3, or 1 for monochrome."""
         return channel_count(self.cfa)
-
-    def sum_of_views(self) -> tuple[np.ndarray, np.ndarray]:
-        """Photons of all views, and numbers of views, (H, W, C) each, in the colours of the pixels."""
-        views = np.ndindex(self.grid.rows, self.grid.cols)
-        light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
-        return colours_and_samples(light[..., None], self.cfa)
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.

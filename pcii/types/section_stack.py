@@ -92,11 +92,6 @@ class Sections(Drawn):
         """
         return read_only(self.readout.photons(self.counts, self.coverage))
 
-    @property
-    def saturated(self) -> np.ndarray:
-        """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
-        return np.isinf(self.estimate)
-
     def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""
         sums, samples = self.counts[plane], self.coverage[plane]

@@ -119,12 +119,9 @@ def test_what_cannot_be_demosaiced_is_refused_by_name(raw, options, words):
 @pytest.mark.parametrize("method", ["bilinear", "malvar", "menon"])
 def test_other_methods_keep_what_the_sensor_saw_and_mix_no_colours_at_the_border(method):
     raw = np.random.default_rng(1).random((12, 15))
-    before = np.get_printoptions()
     for cfa in PATTERNS:
         np.testing.assert_allclose(mosaic(demosaic(raw, cfa=cfa, method=method), cfa), raw, rtol=1e-12)
-    assert np.get_printoptions() == before
     # Red is 1 and the rest 0.2: the package alone lets a border's red leak into the other colours.
     flat = np.broadcast_to([1.0, 0.2, 0.2], (10, 10, 3))
     image = demosaic(mosaic(flat, "RGGB"), cfa="RGGB", method=method)
     np.testing.assert_allclose(image, flat, atol=1e-12)
-    assert np.isfinite(demosaic(raw[:2, :2], method=method)).all()
