@@ -9,8 +9,7 @@ from twins import samples_of, unit_grid
 
 import pcii
 from pcii.base.errors import InputError
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_events import MOST_FRAMES, Readout
+from pcii.types.photon_counts import MOST_FRAMES, PhotonCounts, Readout
 
 
 def minus_log(share: Fraction) -> Decimal:
