@@ -10,7 +10,7 @@ on the first picture.
 
 charts    Charts of scores: accuracy against photons and seconds, reliability of confidence.
 exposure  How photons become an image: blocks, smoothing, means, one exposure for several images.
-panels    Axes to draw in, pictures and maps over the pixels of a view, colour bars.
+panels    Axes to draw in, pictures over the pixels of a view, colour bars.
 pictures  Light, masks, depth and errors as 8-bit sRGB, and their files.
 plots     What each type shows of itself: `.plot()` of all, and their page in notebooks.
 """

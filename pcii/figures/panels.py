@@ -1,4 +1,4 @@
-"""Axes to draw in, pictures and maps over the pixels of a view, and colour bars."""
+"""Axes to draw in, pictures over the pixels of a view, and colour bars."""
 
 import io
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
-from pcii.figures.pictures import DEPTH_COLOURS, map_image, uri_of
+from pcii.figures.pictures import uri_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,35 +118,17 @@ def show_picture(
     axes.locator_params(integer=True, nbins=6)
 
 
-def show_map(
-    axes: "Axes",
-    values: np.ndarray,
-    shape_HW: Sequence[int],
-    title: str,
-    colours: str,
-    limits: tuple[float, float],
-    label: str,
-    confidence: np.ndarray | None = None,
-    block_px: float = 1.0,
-) -> None:
-    """Draw values (h, w) as `map_image` colours them, over the pixels of a view, with their colour bar."""
-    image = map_image(values, colours, limits, confidence)
-    show_picture(axes, image, shape_HW, title, block_px)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    bar = figure.colorbar(_scale(colours, limits), ax=axes, label=label)
-    if colours == DEPTH_COLOURS:  # near is on top
-        bar.ax.invert_yaxis()
-
-
 def colour_bar_uri(colours: str, limits: tuple[float, float], label: str) -> str:
     """A colour bar with ticks, alone and lying, as a data URI for HTML."""
     figure = new_figure(3.8, 0.62, "constrained")
-    figure.colorbar(_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label)
+    figure.colorbar(
+        colour_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label
+    )
     return figure_uri(figure)
 
 
-def _scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
+def colour_scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
+    """What a colour bar of a map between two limits shows."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

@@ -18,15 +18,15 @@ from pcii.figures.exposure import PANEL_PX, block_px, exposed, photon_picture
 from pcii.figures.panels import (
     COLOURS,
     MAX_PANELS,
+    colour_scale,
     draw_outline,
     hide_frame,
     plot_label,
     several_axes,
-    show_map,
     show_picture,
     write_in_middle,
 )
-from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, SHARE_COLOURS
+from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
@@ -129,16 +129,6 @@ def draw_depth(depth: Any, axes: Any, z_range_mm: tuple[float, float] | None = N
     return panels
 
 
-def draw_posterior(posterior: Any, axes: Any) -> np.ndarray:
-    """Entropy in bits of each block, whose outcomes are the planes and no surface."""
-    shape_HW = posterior.planes.grid.shape_HW
-    panels = several_axes(axes, 1, shape_HW)
-    limits, bits = (0.0, float(np.log2(len(posterior.planes) + 1))), posterior.entropy_bits()
-    scale = SHARE_COLOURS, limits, "entropy (bits)"
-    show_map(panels[0], bits, shape_HW, "uncertainty of depth", *scale, block_px=posterior.block_px)
-    return panels
-
-
 def draw_truth(truth: Any, axes: Any, z_range_mm: tuple[float, float] | None = None) -> np.ndarray:
     """Depth of the objects (of all, if there are none) and the objects with their names."""
     panels = several_axes(axes, 2, truth.z_mm.shape)
@@ -171,7 +161,11 @@ def _draw_depths(
         show_picture(axes, np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape))
         write_in_middle(axes, "no depth is known")
         return
-    show_map(axes, z_mm, z_mm.shape, title, DEPTH_COLOURS, limits, "depth z (mm)", confidence)
+    show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(colour_scale(DEPTH_COLOURS, limits), ax=axes, label="depth z (mm)")
+    bar.ax.invert_yaxis()  # near is on top
 
 
 def _draw_objects(axes: "Axes", truth: Any) -> None:
@@ -201,6 +195,5 @@ DRAWINGS: dict[str, Callable[..., np.ndarray]] = {
     "Sections": draw_sections,
     "Segmented": draw_masks,
     "DepthMap": draw_depth,
-    "DepthPosterior": draw_posterior,
     "Truth": draw_truth,
 }

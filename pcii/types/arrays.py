@@ -37,7 +37,6 @@ class Drawn(ShortForm):
         | `Sections`, `Segmented` | a panel a section, with outlines of the masks; 12 at most | |
         | `DepthMap` | depth, grey without an answer | `z_range_mm`: (near, far) of the scale |
         | `Truth` | depth, and the objects | `z_range_mm` |
-        | `DepthPosterior` | entropy of each block, in bits | |
 
         All sections have the same exposure: the 98th percentile of what is lit is white.
         Raises `InputError` for what are no axes, another number of them, and no camera of the grid.

@@ -122,18 +122,6 @@ def test_the_colour_of_no_answer_is_in_no_colour_map() -> None:
     assert image[0, :2].tolist() == [list(NO_ANSWER)] * 2
 
 
-def test_a_posterior_shows_its_entropy() -> None:
-    probability = np.full((2, 6, 8), 0.25, dtype=np.float32)
-    probability[:, 0, 0] = 0.9, 0.0
-    no_surface = (1 - probability.sum(axis=0)).astype(np.float32)
-    posterior = pcii.DepthPosterior(FocalPlanes.at_depths(GRID, Z_MM), probability, no_surface, 2)
-    bits = posterior.entropy_bits()
-    np.testing.assert_allclose(bits[0, :2], [-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1), 1.5], atol=1e-5)
-    (axes,) = posterior.plot()
-    assert axes.get_images()[0].get_extent() == [-0.5, 15.5, 11.5, -0.5]
-    assert colour_bar(axes).get_ylim() == pytest.approx((0, np.log2(3)))
-
-
 def test_neither_an_outlying_depth_nor_rounding_sets_the_scale() -> None:
     z_mm = np.linspace(540, 620, 500).reshape(20, 25)
     z_mm[0, 0] = 1e6
