@@ -171,13 +171,6 @@ def test_hardly_any_data_is_drawn_without_a_warning(size: tuple[int, int, int, i
         value.plot()[0].figure.draw_without_rendering()
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1.0])
-def test_numbers_that_are_no_light_are_drawn_without_a_warning(value: float) -> None:
-    planes = FocalPlanes.at_depths(GRID, Z_MM)
-    sections = pcii.Sections(planes, np.full((2, 12, 16, 3), value), np.ones((2, 12, 16, 3)))
-    assert sections._repr_html_().count("<img") == 1
-
-
 def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     means = pd.DataFrame(
         {

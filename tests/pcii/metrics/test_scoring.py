@@ -98,17 +98,6 @@ def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
         score(None, DepthMap(*np.ones((2, 1, 1))), truth(), grid=GRID)
 
 
-def test_the_claimed_share_of_an_empty_dark_scene() -> None:
-    masks = np.zeros((2, 24, 32), dtype=bool)
-    masks[1, :6, :8] = True  # 48 of 768 pixels
-    empty = Truth(np.full((24, 32), np.inf), np.zeros((24, 32), dtype=int), {})
-    rows = score(segmented(masks), None, empty).planes
-    assert [(row["z_mm"], row["claimed_share"], row["iou"]) for row in rows] == [
-        *[(540.0, 0.0, 1.0)] * 2,
-        *[(620.0, 1 / 16, 0.0)] * 2,
-    ]
-
-
 def test_without_truth_everything_unknown_is_none() -> None:
     result = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, None)
     assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)

@@ -8,9 +8,7 @@ from property_settings import at_least
 from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.sections.demosaicing import demosaic
 from pcii.sections.reconstruction import reconstruct
-from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -110,15 +108,6 @@ def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed
         assert sections.cfa == cfa
         np.testing.assert_array_equal(sections.counts[0, ..., 0], sums)
         np.testing.assert_array_equal(sections.coverage[0, ..., 0], samples)
-
-
-def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
-    grid = unit_grid(3, 3, 24, 24, (2.0, 2.0))
-    flat = np.broadcast_to([0.8, 0.3, 0.1], (*grid.shape_KLHW, 3))
-    sections = reconstruct(Views(mosaic(flat, "GRBG")[..., None], grid, "GRBG"), 1.0, shifts="even")
-    assert sections.cfa == "GRBG"
-    colours = demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)
-    np.testing.assert_allclose(colours, flat[0, 0], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
