@@ -59,10 +59,10 @@ def several_axes(
     from matplotlib.axes import Axes
 
     if axes is not None:
-        panels = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
+        panels = np.asarray(axes, dtype=object).ravel()
         if len(panels) != count or not all(isinstance(panel, Axes) for panel in panels):
             raise InputError(f"axes: expected Matplotlib axes of {count} panels, got {axes!r:.80}")
-        return _array_of(panels)
+        return panels
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
     height, width = (PANEL_IN * side / max(shape) for side in shape)
@@ -70,13 +70,7 @@ def several_axes(
     figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
     for unused in grid.flat[count:]:
         figure.delaxes(unused)
-    return _array_of(list(grid.flat[:count]))
-
-
-def _array_of(axes: "Sequence[Axes]") -> np.ndarray:
-    panels = np.empty(len(axes), dtype=object)
-    panels[:] = axes
-    return panels
+    return grid.ravel()[:count]
 
 
 def new_figure(width_in: float, height_in: float, layout: Literal["compressed", "constrained"]) -> "Figure":
