@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import Measured, Parameter, Row, Study, Value, label
-from pcii.figures.charts import few_ticks, quiet_grid
+from pcii.figures.charts import quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
 
 if TYPE_CHECKING:
@@ -65,7 +65,6 @@ def bars(
     axes.set_xlabel(unit, fontsize=9)
     if log:
         axes.set_xscale("log")
-        few_ticks(axes.xaxis)
     _plain(axes)
 
 
@@ -76,10 +75,8 @@ def frame(axes: "Axes", x: str, y: str, title: str = "", *, log: str = "xy") -> 
     axes.set_title(title, fontsize=10)
     if "x" in log:
         axes.set_xscale("log")
-        few_ticks(axes.xaxis)
     if "y" in log:
         axes.set_yscale("log")
-        few_ticks(axes.yaxis)
     _plain(axes)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=7.5)

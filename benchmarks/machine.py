@@ -11,8 +11,8 @@ from typing import Any
 from simgen.dataset.dataset_folder import versions as dataset_versions
 from simgen.renderer import backend
 
-PEERS = ("scipy", "numba", "colour-science", "colour-demosaicing")
-EXTRAS = ("opencv-python-headless", "flip-evaluator", "mitsuba-oidn")
+PEERS = ("scipy", "numba", "colour-science")
+EXTRAS = ("colour-demosaicing", "opencv-python-headless", "flip-evaluator", "mitsuba-oidn")
 BUSY = 0.25
 """Share of the cores in use from which on a machine counts as busy."""
 LOOK_S = 1.0

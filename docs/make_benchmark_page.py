@@ -21,7 +21,7 @@ from pcii.evaluation.rows import frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.evaluation.summary import lines_of, means
 from pcii.evaluation.tables import with_interval
-from pcii.figures.charts import few_ticks, quiet_grid
+from pcii.figures.charts import quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
 from pcii.store.collection import IN_FRAMES
 from simgen.dataset.benchmark_making import load_definition
@@ -103,8 +103,6 @@ def draw(table: pd.DataFrame, kinds: Mapping[str, str], file: Path) -> None:
     for axis in axes.flat:
         axis.set(xscale="log", ylim=(-0.02, 1.02))
         quiet_grid(axis)
-    for axis in axes[1]:
-        few_ticks(axis.xaxis)
     for axis in axes[:, 0]:
         axis.set_ylabel("IoU")
     handles, names = axes[0, 0].get_legend_handles_labels()

@@ -367,15 +367,10 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         table[f"reconstruct, photons{name}"] = ("reconstruct", _sections_of_counts(options))
     for name, options in OPTIONS.items():
         table[f"reconstruct, radiance{name}"] = ("reconstruct", _sections_of_views(options))
-    table["reconstruct_each"] = (
-        "reconstruct_each",
-        lambda case: list(pcii.reconstruct_each(case.views(cfa="GRBG"), case.z_mm)),
+    table["demosaic"] = (
+        "demosaic",
+        _of_light(lambda case: pcii.demosaic(case.film(case.side, 1e12, 1e308))),
     )
-    for method in ("laroche-prescott", "bilinear", "malvar", "menon"):
-        table[f"demosaic, {method}"] = (
-            "demosaic",
-            _of_light(lambda case, m=method: pcii.demosaic(case.film(case.side, 1e12, 1e308), method=m)),
-        )
     for method in (*pcii.removal_methods(), pcii.ThreeStep(entropy=False)):
         own = not isinstance(method, str)
         table["ThreeStep" if own else f"segment, {method}"] = (
@@ -456,7 +451,6 @@ def cell(call: Callable[[Case], Any], condition: str, name: str) -> str:
 def _outcome(call: Callable[[Case], Any], condition: str, bad: float, name: str) -> str:
     with TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", "Please import", DeprecationWarning)  # of colour-demosaicing
         try:
             arrays = list(numbers_in(call(Case(condition, bad, Path(folder)))))
         except NotApplicableError:

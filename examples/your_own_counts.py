@@ -14,5 +14,6 @@ for k in range(5):
         stack[k, l, i, j] += 1
 
 counts = pcii.PhotonCounts.from_dense(stack, grid, cfa=None)
-for section in pcii.reconstruct_each(counts, z_mm=[500, 600, 700]):
-    print(f"{section.z_mm[0]:g} mm: {section.counts.max()} photons at the brightest voxel")
+sections = pcii.reconstruct(counts, z_mm=[500, 600, 700])
+for z_mm, photons in zip(sections.z_mm, sections.counts, strict=True):
+    print(f"{z_mm:g} mm: {photons.max()} photons at the brightest voxel")

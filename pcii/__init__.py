@@ -22,7 +22,7 @@ from pcii.metrics.true_masks import TrueFocus
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.demosaicing import demosaic
-from pcii.sections.reconstruction import reconstruct, reconstruct_each
+from pcii.sections.reconstruction import reconstruct
 from pcii.store.collection import Collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset, sample
 from pcii.store.dataset_writer import save_dataset
@@ -72,7 +72,6 @@ __all__ = [
     "open_collection",
     "open_dataset",
     "reconstruct",
-    "reconstruct_each",
     "removal_methods",
     "sample",
     "save_dataset",

@@ -234,7 +234,7 @@ def test_pcii_offers_the_names_that_users_rely_on() -> None:
     import pcii
 
     nouns = "CameraGrid Views PhotonCounts Sections Segmented DepthMap Truth Score Dataset InputError"
-    verbs = "reconstruct reconstruct_each demosaic segment estimate_depth score open_dataset removal_methods"
+    verbs = "reconstruct demosaic segment estimate_depth score open_dataset removal_methods"
     for name in (nouns + " " + verbs).split():
         assert callable(getattr(pcii, name)), name
         assert name in pcii.__all__

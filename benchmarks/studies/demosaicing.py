@@ -5,6 +5,7 @@ A texture in closed form and the paper's scene, rendered, through a Bayer patter
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from itertools import product
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
 from benchmarks.textures import Texture
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from pcii.sections.demosaicing import METHODS, demosaic
+from pcii.sections.demosaicing import demosaic
 from pcii.types.bayer import mosaic
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
@@ -28,6 +29,15 @@ if TYPE_CHECKING:
 
 CFA = "GRBG"
 OWN = "laroche-prescott"
+PACKAGE = {
+    "bilinear": "demosaicing_CFA_Bayer_bilinear",
+    "malvar": "demosaicing_CFA_Bayer_Malvar2004",
+    "menon": "demosaicing_CFA_Bayer_Menon2007",
+}
+"""Functions of colour-demosaicing."""
+METHODS = (OWN, *(PACKAGE if has("colour-demosaicing") else ()))
+BORDER_PX = 8
+"""Even and larger than the reach of these functions, whose borders mix colours."""
 BLOCKS = 4
 """Errors are told of so many by so many blocks of a picture, whose spread gives the interval."""
 FULL_LIGHT = 0
@@ -53,10 +63,10 @@ def measure(side_px: int, photons: Sequence[int], timed_px: int, repeats: int) -
             if number:
                 seen = np.random.default_rng(1).poisson(number * seen) / number
             for method in METHODS:
-                found = demosaic(seen, cfa=CFA, method=method)
+                found = demosaiced(seen, method)
                 rows.append(Row(ERRORS, method, {"picture": name, "photons": number}, errors(found, truth)))
     raw = np.random.default_rng(0).random((timed_px, timed_px))
-    ways = {name: lambda _, name=name: demosaic(raw, cfa=CFA, method=name) for name in METHODS}
+    ways = {name: lambda _, name=name: demosaiced(raw, name) for name in METHODS}
     if has("opencv-python-headless"):
         ways |= {name: lambda _, code=code: _by_opencv(raw, code) for name, code in OPENCV.items()}
     seconds = side_by_side(ways, repeats)
@@ -64,8 +74,17 @@ def measure(side_px: int, photons: Sequence[int], timed_px: int, repeats: int) -
         Row(TIMES, name, {"side_px": timed_px}, {"time_ms": median_of(taken, 1e3)})
         for name, taken in seconds.items()
     ]
-    ratios = [ratio_of(f"{OWN} against {name}", seconds[name], seconds[OWN]) for name in ("malvar", "menon")]
+    ratios = [ratio_of(f"{OWN} against {name}", seconds[name], seconds[OWN]) for name in METHODS[2:]]
     return Measured(rows, ratios, [1])
+
+
+def demosaiced(raw: np.ndarray, method: str) -> np.ndarray:
+    """Colours (H, W, 3) of a mosaic, by ours or on the image continued by reflection."""
+    if method == OWN:
+        return demosaic(raw, cfa=CFA)
+    package = import_module("colour_demosaicing")
+    image = getattr(package, PACKAGE[method])(np.pad(raw, BORDER_PX, mode="reflect"), CFA)
+    return image[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
 
 
 def pictures(side_px: int) -> dict[str, np.ndarray]:

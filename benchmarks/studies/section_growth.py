@@ -17,7 +17,7 @@ from benchmarks.machine import has
 from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from pcii.sections.reconstruction import reconstruct, reconstruct_each
+from pcii.sections.reconstruction import reconstruct
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -75,7 +75,7 @@ def _beside_others(side_px: int, repeats: int) -> tuple[list[Row], list[Ratio]]:
     ways: dict[str, Callable[[int], object]] = {
         "events": lambda _: reconstruct(counts, Z_MM),
         "events, with coverage": lambda _: reconstruct(counts, Z_MM).coverage,
-        f"events, {PLANES} planes": lambda _: [section.z_mm for section in reconstruct_each(counts, depths)],
+        f"events, {PLANES} planes": lambda _: [reconstruct(counts, z).z_mm for z in depths],
         "dense, mean": lambda _: reconstruct(views, Z_MM),
         "dense, mean and variance": lambda _: reconstruct(views, Z_MM, variance=True),
         "reading all views once": lambda _: images.reshape(-1).max(),
@@ -112,7 +112,7 @@ def _growth(side_px: int, repeats: int, most_photons: int) -> list[Row]:
 
     def events(number: int, rows: int = 10, side: int = side_px, planes: int = 1) -> Callable[[int], object]:
         counts, z_mm = photons(paper_grid(rows, rows, side), number), np.linspace(450, 750, planes)
-        return lambda _: [section.z_mm for section in reconstruct_each(counts, z_mm)]
+        return lambda _: [reconstruct(counts, z).z_mm for z in z_mm]
 
     axes: dict[tuple[str, str], dict[int, Callable[[int], object]]] = {
         ("events", "photons"): {n: events(n) for n in (10**4, 10**5, 10**6, most_photons)},

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_pictures import Crop, Estimate, Pictures, block_estimate, smoothing_words
+from pcii.app.report_pictures import Estimate, Pictures, block_estimate, smoothing_words
 from pcii.base.compiled_loops import each_in_threads
 from pcii.base.progress import Report
 from pcii.figures.exposure import encoded
 from pcii.figures.pictures import agreement_image, drawing_uri, mask_image, photo_uri
 from pcii.imaging.blocks import evenly_chosen
-from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import total_disparity_px
@@ -30,7 +29,7 @@ MIN_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 MAX_VOXELS = 40_000_000
 """Voxels of the sections in memory at once, 1.2 GB of radiance: 13 planes of 1024 x 1024 pixels in three
-colours, of a part of the film more. Each such group reads all full-light views."""
+colours. Each such group reads all full-light views."""
 
 
 def slider_planes(outcome: Outcome) -> tuple[FocalPlanes, dict[int, int]]:
@@ -74,10 +73,9 @@ def slider(pictures: Pictures, report: Report) -> dict[str, Any]:
             words = smoothing_words(width_px) or " as they are" * (len(estimates) > 1)
             lights.append(_light(f"photon counts{words}", images))
     if dataset.views is not None:
-        part, part_planes, sides = views_around(dataset.views, planes, crop.rows, crop.cols)
         images = []
-        for sections, plane in _each_section(part, part_planes):
-            images.append(block_estimate(sections, plane, Crop(*sides, crop.step_px)))
+        for sections, plane in _each_section(dataset.views, planes):
+            images.append(block_estimate(sections, plane, crop))
             report("pictures of full light", len(images), len(planes))
         lights.append(_light("full light", images))
     z_mm = [f"{z:g}" for z in planes.z_mm]

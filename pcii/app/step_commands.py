@@ -112,7 +112,7 @@ def reconstruct(
             picture = to_srgb8(estimate, white_level(estimate))
             write_png(folder / f"section_{z:g}mm.png", picture)
     say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
-    saturated = int(np.count_nonzero(sections.saturated))
+    saturated = int(np.count_nonzero(np.isinf(sections.estimate)))
     if saturated:
         say(f"{saturated} of {sections.counts.size} voxels are saturated: their estimate is infinite")
     if data.has_counts:

@@ -8,10 +8,9 @@ Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or el
 too. Where no depth is answered a picture is grey, a colour that no map of values has. Matplotlib is imported
 on the first picture.
 
-charts     Charts of scores: bars of shares, reliability of confidence, accuracy against photons and seconds.
-exposure   How photons become an image: blocks, smoothing, means, one exposure for several images.
-panels     Axes to draw in, pictures and maps over the pixels of a view, colour bars, the style for print.
-pictures   Light, masks, depth and errors as 8-bit sRGB, and their files.
-drawn_types What each type shows of itself: `.plot()` of all, and their page in notebooks.
-plots      What `.plot()` of each type draws, of plain arrays.
+charts    Charts of scores: accuracy against photons and seconds, reliability of confidence.
+exposure  How photons become an image: blocks, smoothing, means, one exposure for several images.
+panels    Axes to draw in, pictures over the pixels of a view, colour bars.
+pictures  Light, masks, depth and errors as 8-bit sRGB, and their files.
+plots     What each type shows of itself: `.plot()` of all, and their page in notebooks.
 """

@@ -3,7 +3,6 @@
 They are drawn of data frames, a row for each mean or bin.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +13,10 @@ from pcii.figures.panels import COLOURS, GRID_COLOUR, MARKERS, new_figure, plot_
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 MIN_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
-SHORT_DECADES = 2.5
-"""Powers of ten of a logarithmic axis up to which there is room for ticks at 2 and 5 between them."""
 COLUMNS = 4
 """Panels of a calibration chart side by side."""
 
@@ -30,17 +26,6 @@ def quiet_grid(axes: "Axes") -> None:
     axes.grid(True, color=GRID_COLOUR, linewidth=0.6, alpha=0.4)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def few_ticks(axis: "Axis") -> None:
-    """Name whole powers of ten of a logarithmic axis, and if it is short 2 and 5 between them."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    low, high = axis.get_view_interval()
-    is_short = math.log10(high / low) < SHORT_DECADES
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,)))
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_locator(NullLocator())
 
 
 def _draw_reliability(axes: "Axes", bins: "pd.DataFrame", style: Mapping[str, Any]) -> None:
@@ -89,11 +74,9 @@ def accuracy_chart(
             axes.set_ylim(-0.02, 1.02)
         else:
             axes.set_yscale("log")
-            few_ticks(axes.yaxis)
         quiet_grid(axes)
         if (rows[place] > 0).all():
             axes.set_xscale("log")
-            few_ticks(axes.xaxis)
     panels[0].set_ylabel(label)
     _add_legend(figure, {name: handles[name] for name in sorted(handles)}, 4)
     return figure

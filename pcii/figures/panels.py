@@ -1,16 +1,14 @@
-"""Axes to draw in, pictures and maps over the pixels of a view, colour bars, and the style for print."""
+"""Axes to draw in, pictures over the pixels of a view, and colour bars."""
 
 import io
-import math
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
-from pcii.figures.pictures import DEPTH_COLOURS, map_image, uri_of
+from pcii.figures.pictures import uri_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +17,6 @@ if TYPE_CHECKING:
 
     MaybeAxes: TypeAlias = Axes | Sequence[Axes] | np.ndarray | None
 
-Style = Literal["screen", "paper"]
-"""`paper` has a white background, and a bar of known length below each picture instead of axes in pixels."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """The palette of Okabe and Ito, which the colour-blind can distinguish."""
 MARKERS = "osD^vPX"
@@ -36,8 +32,6 @@ LABELS_IN = 0.9
 DOTS_PER_INCH = 110
 MAX_NAME_LENGTH = 40
 """Characters of a name, about a third of a plot's width."""
-SCALE_BAR_SHARE = 0.3
-"""A scale bar is at most so long, as a share of the picture's width."""
 
 
 def plot_label(name: str) -> str:
@@ -49,15 +43,6 @@ def plot_label(name: str) -> str:
     name = visible(name)
     name = name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}…"
     return name.lstrip("_").replace("$", r"\$")
-
-
-def style_context(style: Style) -> AbstractContextManager[None]:
-    """A context in which the style is drawn; raises `InputError` for an unknown one."""
-    from matplotlib.style import context
-
-    if style not in ("screen", "paper"):
-        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
-    return context("default" if style == "paper" else {})
 
 
 def several_axes(
@@ -74,10 +59,10 @@ def several_axes(
     from matplotlib.axes import Axes
 
     if axes is not None:
-        panels = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
+        panels = np.asarray(axes, dtype=object).ravel()
         if len(panels) != count or not all(isinstance(panel, Axes) for panel in panels):
             raise InputError(f"axes: expected Matplotlib axes of {count} panels, got {axes!r:.80}")
-        return _array_of(panels)
+        return panels
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
     height, width = (PANEL_IN * side / max(shape) for side in shape)
@@ -85,13 +70,7 @@ def several_axes(
     figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
     for unused in grid.flat[count:]:
         figure.delaxes(unused)
-    return _array_of(list(grid.flat[:count]))
-
-
-def _array_of(axes: "Sequence[Axes]") -> np.ndarray:
-    panels = np.empty(len(axes), dtype=object)
-    panels[:] = axes
-    return panels
+    return grid.ravel()[:count]
 
 
 def new_figure(width_in: float, height_in: float, layout: Literal["compressed", "constrained"]) -> "Figure":
@@ -117,13 +96,10 @@ def show_picture(
     shape_HW: Sequence[int],
     title: str,
     block_px: float = 1.0,
-    style: Style = "screen",
-    mm_per_px: float | None = None,
 ) -> None:
     """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
 
-    `shape_HW` is that of a view; blocks that reach over it are cut off. On paper the scale bar is in mm where
-    the size of a pixel is known, and else in px.
+    `shape_HW` is that of a view; blocks that reach over it are cut off.
     """
     height, width = shape_HW
     bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
@@ -131,63 +107,26 @@ def show_picture(
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
     axes.set_title(title)
-    if style == "paper":
-        hide_frame(axes)
-        draw_scale_bar(axes, width, mm_per_px)
-        return
     axes.set_xlabel("column (px)")
     axes.set_ylabel("row (px)")
     axes.locator_params(integer=True, nbins=6)
 
 
-def show_map(
-    axes: "Axes",
-    values: np.ndarray,
-    shape_HW: Sequence[int],
-    title: str,
-    colours: str,
-    limits: tuple[float, float],
-    label: str,
-    confidence: np.ndarray | None = None,
-    block_px: float = 1.0,
-    style: Style = "screen",
-) -> None:
-    """Draw values (h, w) as `map_image` colours them, over the pixels of a view, with their colour bar."""
-    image = map_image(values, colours, limits, confidence)
-    show_picture(axes, image, shape_HW, title, block_px, style)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    bar = figure.colorbar(_scale(colours, limits), ax=axes, label=label)
-    if colours == DEPTH_COLOURS:  # near is on top
-        bar.ax.invert_yaxis()
-
-
 def colour_bar_uri(colours: str, limits: tuple[float, float], label: str) -> str:
     """A colour bar with ticks, alone and lying, as a data URI for HTML."""
     figure = new_figure(3.8, 0.62, "constrained")
-    figure.colorbar(_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label)
+    figure.colorbar(
+        colour_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label
+    )
     return figure_uri(figure)
 
 
-def _scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
+def colour_scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
+    """What a colour bar of a map between two limits shows."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     return ScalarMappable(Normalize(*limits), colours)
-
-
-def draw_scale_bar(axes: "Axes", width_px: float, mm_per_px: float | None) -> None:
-    """Draw a bar of a round length below a picture, in mm, or in px where the size of a pixel is unknown."""
-    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
-
-    px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
-    longest = SCALE_BAR_SHARE * width_px / px
-    decade = 10.0 ** math.floor(math.log10(longest))
-    length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
-    place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}
-    looks = {"color": "black", "frameon": False, "pad": 0.0, "borderpad": 0.0, "sep": 3}
-    looks |= {"size_vertical": 0.01 * width_px, "fill_bar": True}
-    axes.add_artist(AnchoredSizeBar(axes.transData, length * px, f"{length:g} {unit}", **place, **looks))
 
 
 def hide_frame(axes: "Axes") -> None:

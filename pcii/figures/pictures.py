@@ -10,7 +10,7 @@ from pcii.base.safe_files import write_bytes_safely
 from pcii.base.srgb import linear_to_srgb
 
 DEPTH_COLOURS, ERROR_COLOURS, SHARE_COLOURS = "viridis_r", "RdBu_r", "magma"
-"""Colour maps of Matplotlib: depth, near is bright; signed errors; confidence and entropy, more is bright."""
+"""Colour maps of Matplotlib: depth, near is bright; signed errors; confidence, more is bright."""
 NO_ANSWER = (128, 128, 128)
 """Grey where there is no value. None of the colour maps has it, nor a colour of depth mixed with white."""
 AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)

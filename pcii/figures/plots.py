@@ -1,116 +1,140 @@
-"""What `.plot()` of each type but the score draws, of plain arrays: cameras, a view, sections, depth, truth.
+"""What each type shows of itself: `draw` is the `.plot()` of all, and `picture_html` their page in notebooks.
 
-Every function draws into the Matplotlib `axes` that it gets, by default of a new figure, and returns them
-as an array (N,), one for each panel.
+This room comes before the types, so a value is known by the name of its class. Every function draws into the
+Matplotlib `axes` that it gets, by default of a new figure, and returns them as an array (N,), one for each
+panel.
 """
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+import base64
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.figures.charts import quiet_grid
+from pcii.base.errors import InputError
+from pcii.base.plain_text import in_html
 from pcii.figures.exposure import PANEL_PX, block_px, exposed, photon_picture
 from pcii.figures.panels import (
     COLOURS,
     MAX_PANELS,
-    Style,
+    colour_scale,
     draw_outline,
     hide_frame,
     plot_label,
     several_axes,
-    show_map,
     show_picture,
-    style_context,
     write_in_middle,
 )
-from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, SHARE_COLOURS
+from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from pcii.figures.panels import MaybeAxes
-
-Light = tuple[np.ndarray, np.ndarray]
-"""Sums and numbers of samples of an image in its colours, (H, W, C) each."""
+PICTURE_DOTS_PER_INCH = 60
 OUTLIER_SHARE = 0.01
 """Share of the depths, at either end, that may lie outside the scale."""
 MIN_DEPTH_SPAN_MM = 1.0
 """A scale of depth spans so much at least: what is flat is no picture of rounding errors."""
+OBJECT_COLOURS = "tab20"
+"""Colour map of Matplotlib for objects; further objects have the same colours again."""
 MAX_NAMES = 40
 """Objects that are named beside a picture: the largest."""
 NAME_LINES = 16
-"""So many names stand in a column."""
-SHADES = (1.0, 0.7, 0.5)
-"""Brightness of the objects' colours, where all are used up."""
+"""Names in a column."""
 
 
-def plot_cameras(axes: "MaybeAxes", rows: int, cols: int, pitch_mm: tuple[float, float]) -> np.ndarray:
-    """Places of cameras in mm, with both baselines and the virtual centre."""
-    panels = several_axes(axes, 1, (4.0, 4.0))
-    x_mm, y_mm = (
-        (np.arange(count) - (count - 1) / 2) * pitch
-        for count, pitch in zip((cols, rows), pitch_mm, strict=True)
-    )
-    x, y = np.meshgrid(x_mm, y_mm)
-    panel = panels[0]
-    panel.scatter(x, y, s=max(4.0, 40.0 - 2 * max(x.shape)), color=COLOURS[0], label="cameras")
-    panel.scatter([0], [0], marker="+", s=90, color=COLOURS[1], label="virtual centre", zorder=3)
-    half = 0.6 * max(np.ptp(x_mm), np.ptp(y_mm), 1.0)
-    panel.set_aspect("equal")
-    panel.set_xlim(-half, half)
-    panel.set_ylim(half, -half)
-    panel.set_xlabel(f"X, right (mm); baseline {np.ptp(x_mm):.4g} mm")
-    panel.set_ylabel(f"Y, down (mm); baseline {np.ptp(y_mm):.4g} mm")
-    panel.set_title(f"{rows} x {cols} cameras, pitch {pitch_mm[0]:g}, {pitch_mm[1]:g} mm (x, y)")
-    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize="small")
-    quiet_grid(panel)
+def draw(value: Any, axes: Any = None, **options: Any) -> np.ndarray:
+    """Draw a value into Matplotlib axes, by default new ones, and return them (N,)."""
+    return DRAWINGS[type(value).__name__](value, axes, **options)
+
+
+def picture_html(value: Any) -> str:
+    """The line of a value and its drawing, in HTML; without a picture if its data cannot be read."""
+    from matplotlib import pyplot
+
+    line, png = f"<pre>{in_html(repr(value))}</pre>", io.BytesIO()
+    try:
+        figure = draw(value)[0].figure
+    except (InputError, OSError):
+        return line
+    figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
+    pyplot.close(figure)
+    return f'{line}<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
+
+
+def draw_counts(counts: Any, axes: Any, view: Any = None) -> np.ndarray:
+    """The photons of the camera `view`, (k, l), by default in the middle; in grey: few give false colours."""
+    k, l = _camera(counts.grid, view)
+    image = counts.view(k, l)
+    step_px = block_px(image.shape, PANEL_PX)
+    panels = several_axes(axes, 1, image.shape)
+    title = f"view ({k}, {l}), photons: {image.sum()}"
+    show_picture(panels[0], photon_picture(image, step_px), image.shape, title, step_px)
     return panels
 
 
-def plot_view(axes: "MaybeAxes", light: np.ndarray | Light, title: str) -> np.ndarray:
-    """One view: photon counts (H, W) in grey, since so few would give false colours; light in its colours."""
-    shape_HW = light.shape if isinstance(light, np.ndarray) else light[0].shape[:2]
+def draw_views(views: Any, axes: Any, view: Any = None) -> np.ndarray:
+    """The elemental image of the camera `view`, by default in the middle, in colours."""
+    k, l = _camera(views.grid, view)
+    shape_HW = views.grid.shape_HW
     step_px = block_px(shape_HW, PANEL_PX)
-    image = photon_picture(light, step_px) if isinstance(light, np.ndarray) else exposed([light], step_px)[0]
     panels = several_axes(axes, 1, shape_HW)
-    show_picture(panels[0], image, shape_HW, title, step_px)
+    (image,) = exposed([views.in_colours(k, l)], step_px)
+    show_picture(panels[0], image, shape_HW, f"view ({k}, {l})", step_px)
     return panels
 
 
-def plot_sections(
-    axes: "MaybeAxes",
-    z_mm: np.ndarray,
-    light_of: Callable[[int], Light],
-    shape_HW: tuple[int, int],
-    px_at_1mm: float,
-    style: Style,
-    masks: np.ndarray | None = None,
-    method: str = "",
-) -> np.ndarray:
+def _camera(grid: Any, view: Any) -> tuple[Any, Any]:
+    if view is None:
+        return grid.middle_camera
+    if not isinstance(view, tuple | list) or len(view) != 2:
+        raise InputError(f"view: expected a camera (k, l), got {view!r}")
+    return view[0], view[1]
+
+
+def draw_sections(sections: Any, axes: Any, focus: Any = None) -> np.ndarray:
     """Sections, a panel each, all at one exposure; of more than 12 the evenly chosen 12.
 
-    `light_of` gives the light of a plane, `px_at_1mm` is the size of a pixel in mm at a depth of 1 mm. With
-    `masks` (Z, H, W) only voxels inside are drawn, and outlines.
+    With the masks of a `focus` only voxels inside are drawn, and outlines.
     """
 
-    def visible_light(plane: int) -> Light:
-        sums, samples = light_of(plane)
-        return (sums if masks is None else sums * masks[plane][..., None]), samples
+    def light(plane: int) -> tuple[np.ndarray, np.ndarray]:
+        sums, samples = sections.in_colours(plane)
+        return (sums if focus is None else sums * focus.in_focus[plane][..., None]), samples
 
-    planes, voxels = evenly_chosen(len(z_mm), MAX_PANELS), light_of(0)[0].shape
-    step = block_px(voxels, PANEL_PX)
-    images = exposed(map(visible_light, planes), step)
-    with style_context(style):
-        panels = several_axes(axes, len(planes), shape_HW)
-        for panel, plane, image in zip(panels, planes, images, strict=True):
-            title = f"section at {z_mm[plane]:.5g} mm"
-            if masks is not None:
-                title = f"{z_mm[plane]:.5g} mm: {masks[plane].mean():.1%} in focus\n{plot_label(method)}"
-                draw_outline(panel, masks[plane], shape_HW, COLOURS[4])
-            side = step * shape_HW[0] / voxels[0]
-            show_picture(panel, image, shape_HW, title, side, style, z_mm[plane] * px_at_1mm)
+    z_mm, shape_HW, voxels = sections.z_mm, sections.grid.shape_HW, sections.counts.shape[1:3]
+    planes, step = evenly_chosen(len(z_mm), MAX_PANELS), block_px(voxels, PANEL_PX)
+    panels = several_axes(axes, len(planes), shape_HW)
+    for panel, plane, image in zip(panels, planes, exposed(map(light, planes), step), strict=True):
+        title = f"section at {z_mm[plane]:.5g} mm"
+        if focus is not None:
+            mask = focus.in_focus[plane]
+            title = f"{z_mm[plane]:.5g} mm: {mask.mean():.1%} in focus\n{plot_label(focus.method)}"
+            draw_outline(panel, mask, shape_HW, COLOURS[4])
+        show_picture(panel, image, shape_HW, title, step * shape_HW[0] / voxels[0])
+    return panels
+
+
+def draw_masks(focus: Any, axes: Any) -> np.ndarray:
+    """Each section after removal with the outline of its mask."""
+    return draw_sections(focus.sections, axes, focus)
+
+
+def draw_depth(depth: Any, axes: Any, z_range_mm: tuple[float, float] | None = None) -> np.ndarray:
+    """Depth in mm with a scale from `z_range_mm`, (near, far), by default of all but outlying depths."""
+    panels = several_axes(axes, 1, depth.z_mm.shape)
+    _draw_depths(panels[0], depth.z_mm, depth.confidence, z_range_mm, "depth, paler where less sure")
+    return panels
+
+
+def draw_truth(truth: Any, axes: Any, z_range_mm: tuple[float, float] | None = None) -> np.ndarray:
+    """Depth of the objects (of all, if there are none) and the objects with their names."""
+    panels = several_axes(axes, 2, truth.z_mm.shape)
+    title = "true depth of the objects" if truth.has_objects else "true depth"
+    _draw_depths(panels[0], truth.object_z_mm, None, z_range_mm, title)
+    _draw_objects(panels[1], truth)
     return panels
 
 
@@ -124,88 +148,52 @@ def depth_limits_mm(z_mm: np.ndarray) -> tuple[float, float] | None:
     return float(middle - half), float(middle + half)
 
 
-def plot_depth(
-    axes: "MaybeAxes",
+def _draw_depths(
+    axes: "Axes",
     z_mm: np.ndarray,
     confidence: np.ndarray | None,
     z_range_mm: tuple[float, float] | None,
-    title: str = "depth, paler where less sure",
-    style: Style = "screen",
-) -> np.ndarray:
+    title: str,
+) -> None:
     """Depth (H, W) in mm with a colour bar, near is bright: paler where less sure, grey without an answer."""
     limits = z_range_mm or depth_limits_mm(z_mm)
-    with style_context(style):
-        panels = several_axes(axes, 1, z_mm.shape)
-        if limits is not None:
-            scale = DEPTH_COLOURS, limits, "depth z (mm)"
-            show_map(panels[0], z_mm, z_mm.shape, title, *scale, confidence, style=style)
-        else:
-            show_picture(panels[0], np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape), style)
-            write_in_middle(panels[0], "no depth is known")
-    return panels
+    if limits is None:
+        show_picture(axes, np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape))
+        write_in_middle(axes, "no depth is known")
+        return
+    show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(colour_scale(DEPTH_COLOURS, limits), ax=axes, label="depth z (mm)")
+    bar.ax.invert_yaxis()  # near is on top
 
 
-def plot_probability(
-    axes: "MaybeAxes", z_mm: np.ndarray, probability: np.ndarray, no_surface: float, pixel: tuple[int, int]
-) -> np.ndarray:
-    """Probability (Z,) of a surface at each depth, at one pixel."""
-    panels = several_axes(axes, 1)
-    panel = panels[0]
-    panel.fill_between(z_mm, probability, color=COLOURS[0], alpha=0.3, linewidth=0)
-    marker = "o" if z_mm.size <= 40 else None
-    panel.plot(z_mm, probability, color=COLOURS[0], linewidth=1.4, marker=marker, markersize=3)
-    panel.set_ylim(bottom=0)
-    panel.set_xlabel("depth z (mm)")
-    panel.set_ylabel("probability of a surface")
-    panel.set_title(f"pixel {pixel}, no surface: {no_surface:.1%}")
-    quiet_grid(panel)
-    return panels
-
-
-def plot_entropy(
-    axes: "MaybeAxes", bits: np.ndarray, plane_count: int, shape_HW: tuple[int, int], side_px: int
-) -> np.ndarray:
-    """Entropy (h, w) in bits of blocks, `side_px` wide, whose outcomes are the planes and no surface."""
-    panels = several_axes(axes, 1, shape_HW)
-    limits, title = (0.0, float(np.log2(plane_count + 1))), "uncertainty of depth"
-    show_map(panels[0], bits, shape_HW, title, SHARE_COLOURS, limits, "entropy (bits)", block_px=side_px)
-    return panels
-
-
-def plot_truth(
-    axes: "MaybeAxes",
-    z_mm: np.ndarray,
-    object_id: np.ndarray,
-    names: Mapping[int, str],
-    z_range_mm: tuple[float, float] | None,
-) -> np.ndarray:
-    """Depth of the objects (of all, if there are none) and the objects with their names."""
-    panels = several_axes(axes, 2, z_mm.shape)
-    title = "true depth of the objects" if (object_id > 0).any() else "true depth"
-    plot_depth(panels[0], z_mm, None, z_range_mm, title)
-    _draw_objects(panels[1], object_id, names)
-    return panels
-
-
-def _draw_objects(axes: "Axes", object_id: np.ndarray, names: Mapping[int, str]) -> None:
-    """Objects (H, W) in colours, grey where none is; the names of the largest stand beside the picture."""
-    from matplotlib.colors import to_rgb
+def _draw_objects(axes: "Axes", truth: Any) -> None:
+    """Objects in colours, grey where none is; the names of the largest stand beside the picture."""
+    from matplotlib import colormaps
     from matplotlib.patches import Patch
 
-    image = np.full((*object_id.shape, 3), NO_ANSWER, np.uint8)
-    ids, sizes = np.unique(object_id[object_id > 0], return_counts=True)
-    patches = []
-    for place, number in enumerate(ids.tolist()):
-        turn, place_in_turn = divmod(place, len(COLOURS))
-        red, green, blue = (SHADES[turn % len(SHADES)] * part for part in to_rgb(COLOURS[place_in_turn]))
-        image[object_id == number] = np.round(255 * np.array([red, green, blue]))
-        patches.append(Patch(color=(red, green, blue), label=plot_label(names[number])))
-    show_picture(axes, image, object_id.shape, "objects")
+    ids, sizes = np.unique(truth.object_id[truth.object_id > 0], return_counts=True)
+    colours = np.resize(colormaps[OBJECT_COLOURS].colors, (ids.size, 3))
+    image = np.full((*truth.object_id.shape, 3), NO_ANSWER, np.uint8)
+    for number, colour in zip(ids, colours, strict=True):
+        image[truth.object_id == number] = np.round(255 * colour)
+    show_picture(axes, image, truth.object_id.shape, "objects")
     hide_frame(axes)
-    if not patches:
+    if not ids.size:
         write_in_middle(axes, "no object is seen")
         return
-    largest = sorted(np.argsort(-sizes, kind="stable")[:MAX_NAMES])
-    columns = -(-len(largest) // NAME_LINES)
-    place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "ncols": columns}
-    axes.legend(handles=[patches[n] for n in largest], frameon=False, fontsize="small", **place)
+    largest = np.sort(np.argsort(-sizes, kind="stable")[:MAX_NAMES])
+    patches = [Patch(color=colours[n], label=plot_label(truth.names[int(ids[n])])) for n in largest]
+    place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "ncols": -(-len(patches) // NAME_LINES)}
+    axes.legend(handles=patches, frameon=False, fontsize="small", **place)
+
+
+DRAWINGS: dict[str, Callable[..., np.ndarray]] = {
+    "PhotonCounts": draw_counts,
+    "Views": draw_views,
+    "Sections": draw_sections,
+    "Segmented": draw_masks,
+    "DepthMap": draw_depth,
+    "Truth": draw_truth,
+}

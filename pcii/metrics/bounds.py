@@ -24,19 +24,6 @@ AWAY_FROM_EDGES_PX = 4
 included."""
 
 
-def camera_information(grid: CameraGrid) -> tuple[float, float]:
-    """Mean square of the cameras' shifts per px of total disparity, (horizontal, vertical).
-
-    (n + 1) / (12 (n - 1)) along an axis of n cameras that has the whole total disparity: 0.102 for 10. For an
-    axis of less total disparity it is smaller by the square of the ratio, for a single camera 0.
-    """
-    total = float(total_disparity_px(grid, 1.0))
-    if total == 0:
-        return 0.0, 0.0
-    d_x, d_y = (float(d) / total for d in parallax_px(grid, 1.0))
-    return (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
-
-
 def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[float, float]) -> float | None:
     """Least standard deviation of total disparity that any unbiased method can have, in px.
 
@@ -51,7 +38,12 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     >>> depth_bound_px(grid, photons=5000, gradient_squared=(0.01, 0.01)).__round__(3)
     0.313
     """
-    c_x, c_y = camera_information(grid)
+    total = float(total_disparity_px(grid, 1.0))
+    if total == 0:
+        return None
+    d_x, d_y = (float(d) / total for d in parallax_px(grid, 1.0))
+    # Mean squares of the cameras' shifts per px of total disparity: 0.102 for 10 cameras along an axis.
+    c_x, c_y = (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
     information = photons * (c_x * gradient_squared[0] + c_y * gradient_squared[1])
     return float(1 / np.sqrt(information)) if information > 0 else None
 

@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.imaging.mask_outlines import object_share
 from pcii.metrics.bounds import object_bounds, plane_bounds
 from pcii.metrics.depth_accuracy import depth_errors
-from pcii.metrics.true_masks import KINDS, Kind, TrueFocus, mask_agreement, photon_agreement
+from pcii.metrics.true_masks import KINDS, TrueFocus, mask_agreement, photon_agreement
 from pcii.sections.photon_statistics import (
     entropy_bits,
     pooled_estimate,
@@ -101,13 +101,17 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
         photons = photon_agreement(focus, true, plane)
         for kind in KINDS:
             names = [] if true is None or kind == "pixel" else true.names_at(plane)
+            mask = share = None
+            if true is not None:
+                mask, coverage = true.masks(kind)[plane], true.truth.coverage
+                share = None if coverage is None else object_share(mask, true.truth.object_id, coverage)
             rows.append(
                 {
                     "z_mm": float(depth),
                     "method": focus.method,
                     "object": ", ".join(names) or None,
                     "truth": kind,
-                    **_plane_agreement(focus.in_focus[plane], true, plane, kind),
+                    **mask_agreement(focus.in_focus[plane], mask, share),
                     **photons[kind],
                     "entropy_before": before[plane],
                     "entropy_after": after[plane],
@@ -115,16 +119,6 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
                 }
             )
     return rows
-
-
-def _plane_agreement(
-    claimed: np.ndarray, true: TrueFocus | None, plane: int, kind: Kind
-) -> dict[str, float | None]:
-    if true is None:
-        return mask_agreement(claimed, None)
-    mask, coverage = true.masks(kind)[plane], true.truth.coverage
-    share = None if coverage is None else object_share(mask, true.truth.object_id, coverage)
-    return mask_agreement(claimed, mask, share)
 
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:

@@ -6,9 +6,7 @@ raw Bayer colours never mix. Photon counts stay integers until that last divisio
 interpolated.
 """
 
-from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -18,8 +16,7 @@ from pcii.types.arrays import LARGEST_COUNT, is_whole
 from pcii.types.bayer import colour_cells
 from pcii.types.focal_planes import FocalPlanes, check_data
 from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_events import PLAIN
+from pcii.types.photon_counts import PLAIN, PhotonCounts
 from pcii.types.section_stack import Sections, Shifts
 
 DENSE_SHARE = 1 / 16
@@ -89,25 +86,6 @@ def reconstruct(
     return Sections(planes, sums, coverage_of, subpixel, sample_variance, mosaic, readout)
 
 
-def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
-    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane.
-
-    Yields `Sections` of one plane each; takes the options of `reconstruct` and raises the same errors.
-
-    >>> import pcii
-    >>> grid = pcii.CameraGrid(
-    ...     rows=2, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=8, width=8
-    ... )
-    >>> views = pcii.Views(np.ones((2, 2, 8, 8, 3), dtype=np.float32), grid)
-    >>> [float(section.estimate.max()) for section in pcii.reconstruct_each(views, [1000, 2000])]
-    [1.0, 1.0]
-    """
-    check_data(data)
-    planes = FocalPlanes.at_depths(data.grid, z_mm)
-    for plane in range(len(planes)):
-        yield reconstruct(data, planes.take([plane]), **options)
-
-
 def with_probes(planes: FocalPlanes, *, clear_px: float = 7.0) -> FocalPlanes:
     """The requested planes (Z,), followed by their probe planes.
 
@@ -153,8 +131,8 @@ def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts, variance: 
         raise InputError(f"shifts: use 'nearest' or 'even', not {shifts!r}")
     if shifts != "nearest" and subpixel > 1:
         raise InputError(f"shifts: {shifts!r} is for whole pixels (subpixel = 1)")
-    if variance and subpixel > 1 and isinstance(data, Views):
-        raise InputError("variance: that of radiance is for whole pixels (subpixel = 1)")
+    if variance and subpixel > 1:
+        raise InputError("variance: is for whole pixels (subpixel = 1)")
     if shifts == "even" and data.cfa is None:
         raise InputError("shifts: 'even' is for Bayer mosaics; these data have no pattern (cfa)")
 

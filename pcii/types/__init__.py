@@ -8,8 +8,7 @@ estimates      Results of methods, and their scores: in-focus masks, depth maps,
 focal_planes   Focal planes: the depths of sections, and by how much the views shift for each.
 geometry       Geometry of parallel cameras: the image of a point, disparity and depth.
 images         Elemental images: the radiance of every view.
-photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack.
-photon_events  Photons as events, and the frames of an exposure in which a pixel counts them.
+photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack, and their frames.
 photon_limit   The light of a dataset, and photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.

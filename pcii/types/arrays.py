@@ -23,7 +23,7 @@ MOST_DEPTHS = 10_000
 
 
 class Drawn(ShortForm):
-    """A type that `pcii.figures.drawn_types` draws: `plot` in axes, and a picture in notebooks."""
+    """A type that `pcii.figures.plots` draws: `plot` in axes, and a picture in notebooks."""
 
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, **options: Any) -> np.ndarray:
         """Draw into Matplotlib `axes`, one for each panel, and return them as an array (N,).
@@ -32,26 +32,21 @@ class Drawn(ShortForm):
 
         | of | picture | options |
         |---|---|---|
-        | `CameraGrid` | where the cameras stand, in mm | |
-        | `PhotonCounts` | the photons of a camera, or of all | `view`: (k, l), or "mean" |
+        | `PhotonCounts` | the photons of a camera | `view`: (k, l) |
         | `Views` | one elemental image | `view`: (k, l) |
-        | `Sections`, `Segmented` | a panel a section, with outlines of the masks; 12 at most | `style` |
-        | `DepthMap` | depth, grey without an answer | `z_range_mm`: (near, far) of the scale; `style` |
+        | `Sections`, `Segmented` | a panel a section, with outlines of the masks; 12 at most | |
+        | `DepthMap` | depth, grey without an answer | `z_range_mm`: (near, far) of the scale |
         | `Truth` | depth, and the objects | `z_range_mm` |
-        | `DepthPosterior` | entropy, or the probability of depths | `pixel`: (row, column) |
 
-        All sections have the same exposure: the 98th percentile of what is lit is white. For print,
-        `style="paper"` has a white background and a scale bar, in mm at the depth of a section:
-        `sections.plot(style="paper")[0].figure.savefig("sections.pdf")`, or .svg.
-
-        Raises `InputError` for what are no axes, another number of them, and no camera or pixel of the view.
+        All sections have the same exposure: the 98th percentile of what is lit is white.
+        Raises `InputError` for what are no axes, another number of them, and no camera of the grid.
         """
-        from pcii.figures.drawn_types import draw
+        from pcii.figures.plots import draw
 
         return draw(self, axes, **options)
 
     def _repr_html_(self) -> str:
-        from pcii.figures.drawn_types import picture_html
+        from pcii.figures.plots import picture_html
 
         return picture_html(self)
 

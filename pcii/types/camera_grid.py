@@ -7,7 +7,7 @@ from typing import TypeGuard
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.types.arrays import Drawn, is_whole
+from pcii.types.arrays import is_whole
 
 
 def _is_finite(value: object) -> TypeGuard[float]:
@@ -16,7 +16,7 @@ def _is_finite(value: object) -> TypeGuard[float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraGrid(Drawn):
+class CameraGrid:
     """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
 
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
@@ -44,18 +44,17 @@ class CameraGrid(Drawn):
     shear_px: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        values: dict[str, object] = {}
         for name in ("rows", "cols", "height", "width"):
-            size = values[name] = getattr(self, name)
+            size = getattr(self, name)
             if not is_whole(size) or size < 1:
                 raise InputError(f"{name}: expected a whole number of at least 1, got {size!r}")
-            values[name] = int(size)
+            object.__setattr__(self, name, int(size))
         for name in ("focal_mm", "pixel_mm"):
             length = getattr(self, name)
             if not (_is_finite(length) and length > 0):
                 raise InputError(f"{name}: expected a finite length above 0 mm, got {length!r}")
-            # Small types of NumPy would overflow in products.
-            values[name] = float(length) if isinstance(length, np.generic) else length
+            if isinstance(length, np.generic):  # small types of NumPy would overflow in products
+                object.__setattr__(self, name, float(length))
         for name, least, words in (
             ("pitch_mm", 0.0, "lengths (x, y) above 0 mm"),
             ("shear_px", -math.inf, "numbers (x, y) of pixels"),
@@ -64,14 +63,7 @@ class CameraGrid(Drawn):
             is_pair = isinstance(pair, tuple | list) and len(pair) == 2
             if not is_pair or not all(_is_finite(value) and value > least for value in pair):
                 raise InputError(f"{name}: expected two finite {words}, got {pair!r}")
-            values[name] = (float(pair[0]), float(pair[1]))
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
-
-    @property
-    def baseline_mm(self) -> tuple[float, float]:
-        """Distance of the first and the last camera in mm, (x, y); 0 where there is one."""
-        return (self.cols - 1) * self.pitch_mm[0], (self.rows - 1) * self.pitch_mm[1]
+            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
 
     @property
     def view_count(self) -> int:

@@ -52,11 +52,6 @@ class Segmented(Drawn):
         """Depths of the sections (Z,) float64."""
         return self.sections.z_mm
 
-    @property
-    def cleaned(self) -> np.ndarray:
-        """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
-        return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DepthMap(Drawn):
@@ -86,7 +81,7 @@ class DepthMap(Drawn):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthPosterior(Drawn):
+class DepthPosterior(ShortForm):
     """What is known of the depth of blocks of `block_px` x `block_px` pixels of the virtual centre camera.
 
     `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
@@ -111,12 +106,6 @@ class DepthPosterior(Drawn):
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
-
-    def entropy_bits(self) -> np.ndarray:
-        """Entropy (h, w) of the distribution in bits, float64: 0 is a depth for sure, or surely none."""
-        outcomes = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
-        logarithm = np.log2(outcomes, out=np.zeros(outcomes.shape), where=outcomes > 0)
-        return np.maximum(-(outcomes * logarithm).sum(axis=0), 0)
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.

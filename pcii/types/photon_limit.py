@@ -5,7 +5,7 @@ pixel. A scope is a view, each colour of a view, or all views.
 """
 
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -20,59 +20,26 @@ MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""
 
 
-Scope = Literal["view", "channel", "scene", "exposure", "full-light"]
+Scope = Literal["view", "channel", "scene"]
 
 
 @dataclass(frozen=True)
 class Light:
     """The light of a dataset: `photons` expected in each `scope`.
 
-    A scope is a "view", a colour of a view ("channel") or all views ("scene"). Of an "exposure" no number is
-    stated; "full-light" is the radiance itself. `str` has the text of a light, which names files and columns,
-    and `parse` reads it. Raises `InputError` for a number that is not above 0 or is larger than 10^12, and
-    for one of an exposure or of full light.
-
-    >>> str(Light(1000)), str(Light(300, "channel")), str(FULL_LIGHT), Light.parse("1e3")
-    ('1000', '300-per-channel', 'full-light', Light(photons=1000.0, scope='view'))
+    A scope is a "view", a colour of a view ("channel") or all views ("scene"). Raises `InputError` for a
+    number that is not above 0 or is larger than 10^12.
     """
 
-    photons: float | None = None
+    photons: float
     scope: Scope = "view"
 
     def __post_init__(self) -> None:
-        scopes, number = get_args(Scope), self.photons
-        if self.scope not in scopes:
-            raise InputError(f"scope: expected one of {', '.join(scopes)}, got {self.scope!r}")
-        if self.scope in ("exposure", "full-light"):
-            if number is not None:
-                raise InputError(
-                    f"photons: light of the scope {self.scope!r} states no number, got {number!r}"
-                )
-            return
-        is_number = isinstance(number, int | float | np.number) and not isinstance(number, bool)
-        if number is None or not is_number or not 0 < number <= MOST_PHOTONS:
-            raise InputError(f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {number!r}")
-        object.__setattr__(self, "photons", float(number))
-
-    @classmethod
-    def parse(cls, text: str) -> "Light":
-        """The light of a text: "1000" photons per view, "300-per-channel", "exposure" or "full-light"."""
-        if text in ("exposure", "full-light"):
-            return cls(None, text)
-        number, _, scope = text.partition("-per-")
-        try:
-            return cls(float(number), cast("Scope", scope or "view"))
-        except ValueError:
-            expected = "photons per view, a number above 0, or full-light"
-            raise InputError(f"light: expected {expected}, got {text!r}") from None
-
-    def __str__(self) -> str:
-        if self.photons is None:
-            return self.scope
-        return f"{self.photons:.15g}" + ("" if self.scope == "view" else f"-per-{self.scope}")
-
-
-FULL_LIGHT, BY_EXPOSURE = Light(None, "full-light"), Light(None, "exposure")
+        is_number = isinstance(self.photons, int | float | np.number) and not isinstance(self.photons, bool)
+        if not is_number or not 0 < self.photons <= MOST_PHOTONS:
+            raise InputError(
+                f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {self.photons!r}"
+            )
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
@@ -110,8 +77,6 @@ def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.nd
     """
     if not np.all(np.isfinite(energies)):
         raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
-    if light.photons is None:
-        raise InputError(f"light: {light} states no number of photons")
     # The energy of the scope of each pixel, or of all.
     own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
     with np.errstate(over="ignore"):

@@ -13,7 +13,7 @@ from pcii.types.arrays import Drawn, read_only
 from pcii.types.bayer import by_colour, check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_events import PLAIN, Readout
+from pcii.types.photon_counts import PLAIN, Readout
 
 Shifts = Literal["nearest", "even"]
 
@@ -91,11 +91,6 @@ class Sections(Drawn):
         of few bits miss is made up for: see `Readout.photons`.
         """
         return read_only(self.readout.photons(self.counts, self.coverage))
-
-    @property
-    def saturated(self) -> np.ndarray:
-        """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
-        return np.isinf(self.estimate)
 
     def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""

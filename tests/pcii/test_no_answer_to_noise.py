@@ -116,25 +116,6 @@ def test_what_shows_no_depth_is_not_answered(kind, budget):
     assert max(answered(PhotonCounts.from_dense(film, grid, cfa=None))) <= MOST_FALSE
 
 
-@pytest.mark.slow
-def test_noise_is_answered_as_seldom_as_is_said():
-    cases = itertools.product([*GRIDS, (10, 10)], [*SIZES[2:], (96, 128)], LIGHT, ["GRBG", None], range(3))
-    shares = np.array([answered(noise(*case)) for case in cases])
-    assert np.all(shares.mean(axis=0) <= MOST_FALSE)
-
-
-@pytest.mark.slow
-def test_hot_pixels_are_answered_as_seldom_as_is_said():
-    cases = itertools.product([*GRIDS, (10, 10)], [0.0, 0.01, 1.0, 30.0], [1, 4, 8], [False, True], range(3))
-    shares = np.array(
-        [
-            answered(hot(views, rate, pixels, everywhere=everywhere, seed=seed))
-            for views, rate, pixels, everywhere, seed in cases
-        ]
-    )
-    assert np.all(shares.mean(axis=0) <= MOST_FALSE)
-
-
 @pytest.mark.parametrize(
     ("size", "count", "cfa"),
     mostly_slow(

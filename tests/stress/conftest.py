@@ -8,9 +8,6 @@ HERE = Path(__file__).resolve().parent
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    ignored = (
-        "ignore:Please import:DeprecationWarning"  # colour-demosaicing imports from where SciPy moved it
-    )
     for item in items:
         if HERE in item.path.parents:
-            item.add_marker(pytest.mark.filterwarnings("error", ignored))
+            item.add_marker(pytest.mark.filterwarnings("error"))

@@ -38,7 +38,6 @@ def test_every_method_answers_on_films_of_any_size(size: tuple[int, int], cfa: s
     for method in pcii.removal_methods():
         focus = pcii.segment(counts, [400.0, 500.0], method=method)
         assert focus.in_focus.shape == (2, *size)
-        assert np.isfinite(focus.cleaned).all()
     views = pcii.Views(np.random.default_rng(2).uniform(0, 1, (*grid.shape_KLHW, 3)), grid)
     for data in (counts, views):
         for method in pcii.depth_methods(data):

@@ -50,7 +50,7 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
     assert verify(tmp_path / "out") > 5
     if "depth" in has:
         score = json.loads((tmp_path / "out" / "score.json").read_text())
-        assert score["depth"]["hci"]["answered"] is not None
+        assert score["depth"]["hci"]["badpix_007"] is not None
 
 
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:

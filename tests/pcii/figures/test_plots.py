@@ -1,26 +1,31 @@
-"""What `.plot()` draws: the right values in the right places, for ordinary and for hardly any data."""
+"""What pictures and `.plot()` show: the right values in the right places, bright enough to be seen."""
 
-import io
 import subprocess
 import sys
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib import colormaps, style
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
 import pcii
 from pcii.figures.charts import accuracy_chart, calibration_chart
-from pcii.figures.pictures import DEPTH_COLOURS, ERROR_COLOURS, NO_ANSWER, SHARE_COLOURS, map_image
+from pcii.figures.exposure import SHOWN_PHOTONS, encoded, filled_means, smoothed, smoothing_for
+from pcii.figures.pictures import (
+    DEPTH_COLOURS,
+    ERROR_COLOURS,
+    NO_ANSWER,
+    SHARE_COLOURS,
+    depth_image,
+    map_image,
+)
 from pcii.types.focal_planes import FocalPlanes
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
@@ -36,12 +41,12 @@ def new_figures() -> Iterator[None]:
         pyplot.close("all")
 
 
-def photons(grid: pcii.CameraGrid, cfa: str | None = None, **at: int) -> pcii.PhotonCounts:
+def photons(grid: pcii.CameraGrid, **at: int) -> pcii.PhotonCounts:
     """One photon, of camera (k, l) at pixel (i, j); none if no place is given."""
     dense = np.zeros(grid.shape_KLHW, dtype=int)
     if at:
         dense[at["k"], at["l"], at["i"], at["j"]] = 1
-    return pcii.PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    return pcii.PhotonCounts.from_dense(dense, grid)
 
 
 def picture(axes: Axes) -> np.ndarray:
@@ -57,16 +62,6 @@ def colour_bar(axes: Axes) -> Axes:
     return bar
 
 
-def test_cameras_stand_where_the_grid_says() -> None:
-    (axes,) = GRID.plot()
-    x, y = axes.collections[0].get_offsets().data.T  # type: ignore[union-attr]
-    assert sorted(set(x)) == [-10, 0, 10]
-    assert sorted(set(y)) == [-5, 0, 5]
-    assert axes.yaxis_inverted()  # Y is down
-    assert axes.get_xlabel() == "X, right (mm); baseline 20 mm"
-    assert axes.get_ylabel() == "Y, down (mm); baseline 10 mm"
-
-
 def test_a_photon_is_drawn_in_its_view_at_its_pixel() -> None:
     counts = photons(GRID, k=0, l=2, i=3, j=5)
     image = picture(counts.plot(view=(0, 2))[0])
@@ -76,13 +71,6 @@ def test_a_photon_is_drawn_in_its_view_at_its_pixel() -> None:
     radiance[0, 1, 2, 3] = 1, 0, 0
     views = pcii.Views(radiance, GRID)
     assert np.argwhere(picture(views.plot(view=(0, 1))[0])).tolist() == [[2, 3, 0]]
-
-
-@pytest.mark.parametrize(("j", "channel"), [(4, 1), (5, 0)])
-def test_means_of_a_mosaic_have_its_colours(j: int, channel: int) -> None:
-    image = picture(photons(GRID, "GRBG", k=1, l=1, i=4, j=j).plot(view="mean")[0])
-    assert image[4, j, channel] == 255
-    assert not np.delete(image[4, j], channel).any()
 
 
 def test_single_bright_voxels_do_not_darken_a_section() -> None:
@@ -134,17 +122,6 @@ def test_the_colour_of_no_answer_is_in_no_colour_map() -> None:
     assert image[0, :2].tolist() == [list(NO_ANSWER)] * 2
 
 
-def test_depth_is_paler_where_less_sure_and_its_scale_has_ticks_in_mm() -> None:
-    depth = pcii.DepthMap(np.full((12, 16), 600.0), np.linspace(0, 1, 16)[None].repeat(12, axis=0))
-    (axes,) = depth.plot(z_range_mm=(500, 700))
-    colourful = np.ptp(picture(axes).astype(int), axis=-1)[0]
-    assert (np.diff(colourful) > 0).all()
-    bar = colour_bar(axes)
-    assert bar.get_ylabel() == "depth z (mm)"
-    assert bar.get_ylim() == (700, 500)  # near, which is bright, is on top
-    assert sum(500 <= tick <= 700 for tick in bar.get_yticks()) >= 3
-
-
 def test_neither_an_outlying_depth_nor_rounding_sets_the_scale() -> None:
     z_mm = np.linspace(540, 620, 500).reshape(20, 25)
     z_mm[0, 0] = 1e6
@@ -152,22 +129,6 @@ def test_neither_an_outlying_depth_nor_rounding_sets_the_scale() -> None:
     assert 535 < near < far < 625
     flat = colour_bar(pcii.DepthMap(np.array([[540.0, 540.0001]]), np.ones((1, 2))).plot()[0])
     assert flat.get_ylim() == pytest.approx((540.5, 539.5), abs=1e-3)
-
-
-def test_a_posterior_shows_a_pixel_or_all_entropies() -> None:
-    planes = FocalPlanes.at_depths(GRID, Z_MM)
-    probability = np.full((2, 6, 8), 0.25, dtype=np.float32)
-    probability[:, 0, 0] = 0.9, 0.0
-    no_surface = (1 - probability.sum(axis=0)).astype(np.float32)
-    posterior = pcii.DepthPosterior(planes, probability, no_surface, 2)
-    curve = posterior.plot(pixel=(1, 1))[0].lines[0]
-    assert np.asarray(curve.get_xdata()).tolist() == Z_MM
-    np.testing.assert_allclose(np.asarray(curve.get_ydata(), float), [0.9, 0], atol=1e-6)
-    bits = posterior.entropy_bits()
-    np.testing.assert_allclose(bits[0, :2], [-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1), 1.5], atol=1e-5)
-    (axes,) = posterior.plot()
-    assert axes.get_images()[0].get_extent() == [-0.5, 15.5, 11.5, -0.5]
-    assert colour_bar(axes).get_ylim() == pytest.approx((0, np.log2(3)))
 
 
 def test_truth_shows_depth_of_the_objects_and_their_names() -> None:
@@ -183,54 +144,17 @@ def test_truth_shows_depth_of_the_objects_and_their_names() -> None:
         np.testing.assert_allclose(picture(objects)[i, j], 255 * np.array(patch.get_facecolor()[:3]), atol=1)
 
 
-def test_names_of_two_dozen_objects_do_not_collide() -> None:
-    object_id = np.kron(np.arange(25).reshape(5, 5), np.ones((9, 9), int))
-    names = {number: f"specimen_{number}" for number in range(1, 25)}
-    _, objects = pcii.Truth(np.full(object_id.shape, 500.0), object_id, names).plot()
-    objects.figure.draw_without_rendering()
-    boxes = [text.get_window_extent() for text in objects.get_legend().get_texts()]
-    boxes.append(objects.get_window_extent())
-    assert len(boxes) == 25
-    for number, box in enumerate(boxes):
-        assert not any(box.overlaps(other) for other in boxes[number + 1 :])
-
-
-def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_and_svg() -> None:
-    grid = unit_grid(3, 3, 12, 100)  # at 1 mm a pixel is 1 mm wide
-    sections = pcii.reconstruct(photons(grid, k=1, l=1, i=4, j=4), [1.0, 10.0])
-    focus = pcii.Segmented(np.zeros((2, 12, 100), bool), "by hand", sections)
-    depth = pcii.DepthMap(np.full((12, 100), 9.0), np.ones((12, 100)))
-    with style.context("dark_background"):
-        panels = [*sections.plot(style="paper"), *focus.plot(style="paper"), *depth.plot(style="paper")]
-    labels = []
-    for axes in panels:
-        (bar,) = (each for each in axes.artists if isinstance(each, AnchoredSizeBar))
-        labels.append(bar.txt_label.get_text())
-        assert axes.figure.get_facecolor() == (1, 1, 1, 1)
-        assert axes.get_xlabel() == ""
-        assert {text.get_color() for text in axes.figure.findobj(Text)} == {"black"}
-    assert labels == ["20 mm", "200 mm"] * 2 + ["20 px"]
-    for suffix, start in (("pdf", b"%PDF"), ("svg", b"<?xml")):
-        panels[0].figure.savefig(file := io.BytesIO(), format=suffix)
-        assert file.getvalue().startswith(start)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda counts, _: counts.plot(axes="left"), "axes: expected Matplotlib axes"),
-        (lambda counts, _: pcii.reconstruct(counts, Z_MM).plot(counts.plot()), "axes of 2 panels"),
-        (lambda counts, _: pcii.reconstruct(counts, Z_MM).plot(style=cast(Any, "print")), "style: expected"),
-        (lambda counts, _: counts.plot(view=(3, 0)), r"view: expected a camera"),
-        (lambda _, posterior: posterior.plot(pixel=(-1, 0)), "pixel: expected"),
-        (lambda _, posterior: posterior.plot(pixel=3), "pixel: expected"),
+        (lambda counts: counts.plot(axes="left"), "axes: expected Matplotlib axes"),
+        (lambda counts: pcii.reconstruct(counts, Z_MM).plot(counts.plot()), "axes of 2 panels"),
+        (lambda counts: counts.plot(view=(3, 0)), r"view: expected a camera"),
     ],
 )
 def test_what_cannot_be_drawn_is_named(call: Any, message: str) -> None:
-    planes = FocalPlanes.at_depths(GRID, Z_MM)
-    posterior = pcii.DepthPosterior(planes, np.zeros((2, 12, 16), np.float32), np.ones((12, 16)), 1)
     with pytest.raises(pcii.InputError, match=message):
-        call(photons(GRID), posterior)
+        call(photons(GRID))
 
 
 @pytest.mark.parametrize("size", [(1, 1, 1, 1), (1, 3, 1, 9), (2, 2, 12, 16)])
@@ -243,17 +167,8 @@ def test_hardly_any_data_is_drawn_without_a_warning(size: tuple[int, int, int, i
     depth = pcii.DepthMap(np.full(film, 1.0 if dense.any() else np.nan), np.ones(film))
     nothing = pcii.Truth(np.full(film, np.inf), np.zeros(film, int), {})
     focus = pcii.Segmented(sections.counts.sum(axis=-1) > 0, "any", sections)
-    for value in (grid, counts, sections, depth, nothing, focus, pcii.Views(np.zeros((*size, 3)), grid)):
+    for value in (counts, sections, depth, nothing, focus, pcii.Views(np.zeros((*size, 3)), grid)):
         value.plot()[0].figure.draw_without_rendering()
-    for value in (sections, depth):
-        value.plot(style="paper")[0].figure.draw_without_rendering()
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1.0])
-def test_numbers_that_are_no_light_are_drawn_without_a_warning(value: float) -> None:
-    planes = FocalPlanes.at_depths(GRID, Z_MM)
-    sections = pcii.Sections(planes, np.full((2, 12, 16, 3), value), np.ones((2, 12, 16, 3)))
-    assert sections._repr_html_().count("<img") == 1
 
 
 def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
@@ -293,3 +208,43 @@ def test_matplotlib_is_loaded_by_the_first_picture() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False"] * 3
+
+
+@pytest.mark.parametrize("per_pixel", [0.02, 0.2, 1.5])
+def test_few_photons_of_a_bright_scene_are_smoothed_until_they_are_bright(per_pixel: float) -> None:
+    counts = np.random.default_rng(3).poisson(per_pixel / 3, (200, 240, 3))
+    samples = np.ones_like(counts)
+    sigma = smoothing_for([counts, counts])
+    sums, weights = smoothed(counts, samples, sigma)
+    (image,) = encoded([(filled_means(sums, weights), weights)])
+    assert np.median(image) > 150
+    (raw,) = encoded([(counts / samples, samples)])
+    assert np.median(raw) == 0
+    # Its noise is that of the photons which are said to be under the Gaussian.
+    middle = sums[40:-40, 40:-40].sum(axis=-1)  # some 150 independent places at the fewest photons
+    assert middle.std() / middle.mean() == pytest.approx(SHOWN_PHOTONS**-0.5, rel=0.25)
+
+
+def test_many_photons_none_and_hot_pixels_change_no_smoothing() -> None:
+    assert smoothing_for([np.full((40, 40, 1), 100)]) == 0
+    assert smoothing_for([np.zeros((40, 40, 3), int)]) == 0
+    counts = np.random.default_rng(3).poisson(0.5, (80, 80, 1))
+    usual = smoothing_for([counts])
+    counts[::40, ::40] = 200  # four pixels with a fifth of all photons
+    assert smoothing_for([counts]) == pytest.approx(usual, rel=0.1)
+
+
+def test_light_does_not_leak_from_where_there_are_no_samples() -> None:
+    samples = np.ones((30, 30, 1))
+    samples[:, 15:] = 0
+    mean = filled_means(*smoothed(2 * samples, samples, 1.5))
+    np.testing.assert_allclose(mean[:, :18], 2)
+
+
+def test_depth_is_brighter_the_nearer_and_paler_the_less_sure() -> None:
+    z_mm = np.array([[400.0, 500.0, 600.0]])
+    sure = depth_image(z_mm, 400, 600, np.ones((1, 3)))
+    np.testing.assert_array_equal(sure, depth_image(z_mm, 400, 600))
+    assert (np.diff(sure.sum(axis=-1, dtype=int)[0]) < 0).all()
+    unsure = depth_image(z_mm, 400, 600, np.full((1, 3), 0.5))
+    np.testing.assert_allclose(unsure, (sure + 255.0) / 2, atol=1)

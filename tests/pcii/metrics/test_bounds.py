@@ -5,7 +5,6 @@ import pytest
 from twins import unit_grid
 
 from pcii.metrics.bounds import (
-    camera_information,
     depth_bound_px,
     log_gradient_squared,
     object_bounds,
@@ -45,18 +44,6 @@ def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
     iou = plane_bounds(TrueFocus(FocalPlanes.at_depths(GRID, Z), true))
     # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
     assert iou == {(0, "object"): 3 / 4, (0, "pixel"): 1.0, (1, "object"): 0.0, (1, "pixel"): 1.0}
-
-
-def test_ten_cameras_inform_as_much_as_the_mean_square_of_their_places() -> None:
-    # Places from -1/2 to 1/2 in ninths: 2 (0.5^2 + 1.5^2 + 2.5^2 + 3.5^2 + 4.5^2) / 81 / 10 = 82.5 / 810.
-    assert camera_information(unit_grid(10, 10, 4, 4)) == pytest.approx((82.5 / 810, 82.5 / 810), rel=1e-12)
-    assert round(82.5 / 810, 3) == 0.102
-    assert camera_information(unit_grid(1, 1, 4, 4)) == (0.0, 0.0)
-    # Two columns stand at -1/2 and 1/2; three rows of half the pitch span as much: -1/2, 0, 1/2.
-    two = unit_grid(3, 2, 4, 4, pitch_mm=(2.0, 1.0))
-    assert camera_information(two) == pytest.approx((1 / 4, 1 / 6), rel=1e-12)
-    # One row: no vertical disparity. Four columns of the longer axis: (4 + 1) / (12 x 3).
-    assert camera_information(unit_grid(1, 4, 4, 4)) == pytest.approx((5 / 36, 0.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("grid", [unit_grid(10, 10, 64, 64), unit_grid(4, 6, 64, 64, pitch_mm=(1.0, 2.5))])

@@ -1,7 +1,5 @@
 """Sections of dense views: sums and variances of the samples at each voxel, whatever the shifts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,12 +8,8 @@ from property_settings import at_least
 from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.sections.demosaicing import demosaic
-from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
-from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -23,7 +17,7 @@ patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 
 
 @given(
-    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),  # more views than are read at a time
     pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
     pitch=st.tuples(st.floats(0.3, 3), st.floats(0.3, 3)),
     z=st.floats(0.3, 8),
@@ -59,53 +53,19 @@ def test_sums_and_variances_are_those_of_the_samples(
 
 @given(
     cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
-    film=st.tuples(st.integers(1, 12), st.integers(1, 12)),
-    shear=st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
-    z=st.lists(st.floats(0.3, 8), min_size=1, max_size=3),
-    cfa=patterns,
-    seed=st.integers(0, 999),
-)
-@at_least(100)
-def test_a_part_of_the_sections_is_made_of_a_part_of_the_views(cameras, film, shear, z, cfa, seed) -> None:
-    grid = replace(unit_grid(*cameras, *film, (1.0, 1.0)), shear_px=shear)
-    rng = np.random.default_rng(seed)
-    views = Views(rng.random((*grid.shape_KLHW, 1 if cfa else 3)), grid, cfa)
-    rows, cols = (slice(*sorted(rng.choice(size + 1, 2, replace=False).tolist())) for size in film)
-    part, planes, inside = views_around(views, FocalPlanes.at_depths(grid, z), rows, cols)
-    whole, ours = reconstruct(views, z), reconstruct(part, planes)
-    for name in ("counts", "coverage"):
-        expected = getattr(whole, name)[:, rows, cols]
-        # The order of the sums is another, for views that are in memory.
-        np.testing.assert_allclose(getattr(ours, name)[:, *inside], expected, rtol=1e-12)
-
-
-def test_more_views_than_are_held_at_a_time() -> None:
-    grid = unit_grid(11, 2, 4, 5)  # 8 of 22 views at a time
-    images = np.random.default_rng(1).random((*grid.shape_KLHW, 3))
-    for z in (1.0, 2.7):
-        held, read = (reconstruct(Views(v, grid), z, variance=True) for v in (images, Reader(images)))
-        np.testing.assert_allclose(read.counts, held.counts, rtol=1e-14)
-        assert held.variance is not None
-        assert read.variance is not None
-        np.testing.assert_allclose(read.variance, held.variance, rtol=1e-12)
-
-
-@given(
-    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
     pixels=st.tuples(st.integers(1, 6), st.integers(1, 6)),
     z=st.sampled_from([0.25, 0.5, 1.0, 2.0, 4.0]),  # exact disparities, in whatever order the twin computes
     cfa=patterns,
-    subpixel=st.integers(1, 3),
     most=st.sampled_from([1, 3, 10**6]),
     seed=st.integers(0, 999),
 )
 @at_least(150)
-def test_variances_of_counts_are_those_of_the_samples(cameras, pixels, z, cfa, subpixel, most, seed) -> None:
+def test_variances_of_counts_are_those_of_the_samples(cameras, pixels, z, cfa, most, seed) -> None:
     grid = unit_grid(*cameras, *pixels)
     dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
-    samples = samples_of(dense[..., None], grid, z, cfa=cfa, subpixel=subpixel)
+    samples = samples_of(dense[..., None], grid, z, cfa=cfa)
     for data in dense_and_sparse(dense, grid, cfa):
-        sections = reconstruct(data, z, subpixel=subpixel, variance=True)
+        sections = reconstruct(data, z, variance=True)
         expected = np.zeros(sections.counts.shape[1:])
         for voxel, values in samples.items():
             expected[voxel] = np.var(values, ddof=1) if len(values) > 1 else 0
@@ -150,15 +110,6 @@ def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed
         np.testing.assert_array_equal(sections.coverage[0, ..., 0], samples)
 
 
-def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
-    grid = unit_grid(3, 3, 24, 24, (2.0, 2.0))
-    flat = np.broadcast_to([0.8, 0.3, 0.1], (*grid.shape_KLHW, 3))
-    sections = reconstruct(Views(mosaic(flat, "GRBG")[..., None], grid, "GRBG"), 1.0, shifts="even")
-    assert sections.cfa == "GRBG"
-    colours = demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)
-    np.testing.assert_allclose(colours, flat[0, 0], rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("options", "cfa", "words"),
     [
@@ -166,7 +117,7 @@ def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
         ({"shifts": "even", "subpixel": 2}, "GRBG", "shifts: 'even' is for whole pixels"),
         ({"shifts": "even"}, None, "shifts: 'even' is for Bayer mosaics"),
         ({"subpixel": 0}, None, "subpixel: "),
-        ({"subpixel": 2, "variance": True}, None, "variance: that of radiance is for whole pixels"),
+        ({"subpixel": 2, "variance": True}, None, "variance: is for whole pixels"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(options, cfa, words) -> None:

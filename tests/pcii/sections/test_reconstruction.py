@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from property_settings import at_least
-from twins import bayer_photons, blocky_texture, section_twin, unit_grid
+from twins import blocky_texture, section_twin, unit_grid
 
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.bayer import PATTERNS, mosaic
@@ -69,27 +69,6 @@ def test_colours_never_mix_by_hand():
     assert blue.tolist() == [0, 0, 0, 0]
 
 
-def test_a_photon_goes_to_its_fine_voxel_by_hand():
-    grid = unit_grid(1, 2, 1, 3, pitch_mm=(0.5, 1.0))  # shifts -1/4 and +1/4
-    dense = np.array([[[[0, 1, 0]], [[0, 1, 0]]]])
-    sections = reconstruct(photons(dense, grid), 1.0, subpixel=2)
-    # Columns: centres at 1.5 -+ 0.25 pixels, floor(2.5) = 2 and floor(3.5) = 3. Row: floor(0.5 x 2) = 1.
-    assert sections.counts[0, :, :, 0].tolist() == [[0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 0, 0]]
-
-
-# Counts stay counts
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint32, np.int64])
-def test_the_largest_counts_of_a_dtype_add_up_exactly(dtype):
-    grid = unit_grid(4, 4, 5, 5)
-    most = min(int(np.iinfo(dtype).max), 10**9 + 1)  # beyond float32, and 16 of them beyond uint32
-    sections = reconstruct(photons(np.full(grid.shape_KLHW, most, dtype=dtype), grid, "GRBG"), [1.0, 2.0])
-    np.testing.assert_array_equal(sections.counts, sections.coverage.astype(object) * most)
-    assert sections.counts.max() >= 4 * most
-    assert set(np.unique(sections.estimate)) <= {0.0, float(most)}
-
-
 # Defined answers at the edges
 
 
@@ -151,19 +130,6 @@ def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, parallax, sh
         assert (fault.estimate[0] != pattern)[fault.coverage[0] > 1].mean() > 0.5
     else:
         assert (sections.estimate[2] != pattern)[sections.coverage[2] > 1].mean() > 0.9
-
-
-def test_the_estimate_is_the_rate_of_the_photons():
-    grid = unit_grid(6, 6, 24, 24, pitch_mm=(1.0, 1.0))
-    rates = np.broadcast_to(np.array([0.2, 0.5, 1.1]), (*grid.shape_KLHW, 3))
-    sections = reconstruct(PhotonCounts.from_dense(bayer_photons(rates, "GRBG", 4), grid, cfa="GRBG"), 1.0)
-    samples = sections.coverage[0].sum(axis=(0, 1))
-    mean = sections.counts[0].sum(axis=(0, 1)) / samples
-    # The sum is Poisson, so its mean has the standard error sqrt(rate / samples); 4 of them.
-    tolerance = 4 * np.sqrt(rates[0, 0, 0, 0] / samples)
-    assert np.all(np.abs(mean - [0.2, 0.5, 1.1]) < tolerance)
-    # The planted fault: with green and red exchanged the comparison fails.
-    assert not np.all(np.abs(mean - [0.5, 0.2, 1.1]) < tolerance)
 
 
 def test_views_on_disk_are_read_once_however_many_planes():

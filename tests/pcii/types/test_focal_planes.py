@@ -98,25 +98,10 @@ def test_planes_run_from_far_to_near_in_equal_steps_of_total_disparity(near, ext
     np.testing.assert_allclose(again.z_mm, planes.z_mm, rtol=1e-14)  # two divisions
 
 
-def test_planes_are_taken_and_followed_by_others_in_the_order_asked_for():
-    planes = FocalPlanes.at_depths(unit_grid(1, 5, 8, 8), [1.0, 2.0, 4.0])  # total disparities 4, 2, 1
-    more = planes.take([2, 0]).followed_by([8.0])
-    np.testing.assert_array_equal(more.z_mm, [4.0, 1.0, 0.5])
-    np.testing.assert_array_equal(more.total_disparity_px, [1.0, 4.0, 8.0])
-    assert len(planes.followed_by([])) == 3
-
-
 @pytest.mark.parametrize("bad", [0, [540, -1], np.nan, [], [[540.0]], "near", [[540], [620, 700]], 1e-9])
 def test_depths_that_cannot_be_are_refused(bad):
     with pytest.raises(InputError, match=r"^z_mm: "):
         FocalPlanes.at_depths(paper_grid(), bad)
-
-
-def test_planes_stay_as_they_are_and_belong_to_a_grid():
-    planes = FocalPlanes.at_depths(unit_grid(2, 2, 4, 4), 1.0)
-    assert FocalPlanes.at_depths(planes.grid, planes) is planes
-    with pytest.raises(InputError, match="another camera grid"):
-        FocalPlanes.at_depths(unit_grid(2, 2, 4, 5), planes)
 
 
 def test_indices_far_outside_a_section_of_fine_voxels_do_not_overflow():

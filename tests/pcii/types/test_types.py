@@ -102,10 +102,3 @@ def test_a_view_with_nan_or_infinity_is_refused_by_its_place(bad):
     np.testing.assert_array_equal(views.view(0, 1), np.zeros((3, 3, 1)))
     with pytest.raises(InputError, match=r"view \(1, 0\) holds NaN or infinity"):
         reconstruct(views, 1.0)
-
-
-def test_removal_keeps_what_is_in_focus():
-    grid = unit_grid(1, 1, 1, 2)
-    stack = Sections(FocalPlanes.at_depths(grid, 1.0), np.array([[[[6], [8]]]]), np.full((1, 1, 2, 1), 2))
-    focus = Segmented(np.array([[[True, False]]]), "none", stack)
-    np.testing.assert_array_equal(focus.cleaned, [[[[3.0], [0.0]]]])

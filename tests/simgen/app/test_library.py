@@ -13,7 +13,7 @@ from tiny import GRID_2_X_3, TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.types.photon_events import Readout
+from pcii.types.photon_counts import Readout
 from simgen.photons import counting_plan
 from simgen.spec.recipe import Recipe
 
