@@ -13,8 +13,7 @@ from pcii.evaluation import summary
 from pcii.evaluation.measurement import EvaluationJob, measure
 from pcii.evaluation.method_names import Method, named_methods
 from pcii.evaluation.pages import write_evaluation
-from pcii.evaluation.provenance import origin_of
-from pcii.evaluation.rows import frame_of, key_of, writing_rows
+from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
 from pcii.evaluation.tasks import tasks_of
 from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import open_dataset
@@ -68,10 +67,10 @@ def evaluate(
     those that recipes name. `executor` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
-    unless other software made them (see `pcii.store.software`). evaluation.html, evaluation.md, means.csv and
+    unless other software made them (see `pcii.store.software`). evaluation.html, means.csv and
     evaluation.json summarise the last row of each. The seconds of a row are the wall time of the method
-    alone, after a warm-up call, in a call in which no code was compiled or imported; where several processes
-    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
+    alone, after a warm-up call at the first dataset of each light; where several processes work at a time,
+    each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
     radiance, for an unknown method or budget, for a named method that cannot take the data of a dataset, and
     while another process evaluates into the same folder:
 

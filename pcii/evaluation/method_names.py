@@ -10,8 +10,11 @@ from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function, name_of
+from pcii.depth import methods as depth
 from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
+from pcii.removal import methods as removal
 from pcii.removal.methods import removal_methods
+from pcii.store.software import own_software, software_of_entry_point, software_of_function
 
 DEPTH = "depth"
 """Names the default estimator of depth, which has its full name in rows."""
@@ -48,6 +51,22 @@ class NamedMethod:
         if self.function is not None:
             return not full_light or estimator_of(self.name) is not None
         return self.name in methods_for(full_light=full_light)
+
+
+def software_of(method: NamedMethod) -> dict[str, str] | None:
+    """All software that the result of a method follows from: versions, and hashes of sources.
+
+    For a method of another package these are also that package's version, source and requirements. The source
+    is every file of a package, so also the weights of a network. None for a function that has no source.
+    """
+    estimator = estimator_of(method.name)
+    if method.source:
+        return own_software() | software_of_function(estimator_of(method.source) or method.source)
+    if method.function is not None:
+        return None
+    registry, name = (removal, method.name) if estimator is None else (depth, estimator)
+    point = registry.REGISTRY.point_of(name)
+    return own_software() | ({} if point is None else software_of_entry_point(point))
 
 
 def depth_name(estimator: str) -> str:

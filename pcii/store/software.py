@@ -1,6 +1,7 @@
 """The software that a result follows from: versions, hashes of sources, and how those differ."""
 
 import hashlib
+import os
 import platform
 import re
 from collections.abc import Iterable, Mapping
@@ -49,6 +50,24 @@ def software_of_entry_point(point: "EntryPoint") -> dict[str, str]:
     return software
 
 
+def software_of_function(source: str) -> dict[str, str]:
+    """The file of a function named "module:function" or "file.py:function", as it is now."""
+    place = source.rpartition(":")[0]
+    places = [Path(place)] if place.endswith(".py") else _places([place])
+    return {f"{_SOURCE}{place}": hash_of_source(places)}
+
+
+def machine() -> str:
+    """Processor and system, without a name by which the machine could be found."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = f"{models[0]} ({platform.machine()})" if models else platform.machine()
+    return f"{processor}, {os.cpu_count()} logical cores, {platform.system()}"
+
+
 def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:
     """How the software that made something differs from that of now, in words; empty if it does not.
 
@@ -80,7 +99,7 @@ def hash_of_source(places: Iterable[Path]) -> str:
 
 
 def _places(modules: Iterable[str]) -> list[Path]:
-    """Files and folders of modules at the top level, without importing them."""
+    """Files and folders of modules, without importing those at the top level."""
     places: list[Path] = []
     for name in sorted(modules):
         spec = find_spec(name)

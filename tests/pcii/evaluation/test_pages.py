@@ -13,6 +13,7 @@ import pytest
 from chromium import CHROMIUM
 from hostile_names import DO, NAMES, RAN
 from jinja2 import UndefinedError
+from pcii.evaluation.provenance import origin_of
 from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 
@@ -22,7 +23,6 @@ from pcii.base.plain_text import in_markdown, visible
 from pcii.evaluation import pages as pages_module
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.pages import MAX_DETAILED_SCENES, page, write_evaluation
-from pcii.evaluation.provenance import origin_of
 from pcii.evaluation.rows import frame_of
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import FULL_LIGHT, open_dataset

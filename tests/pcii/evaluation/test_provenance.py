@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 from other_packages import install_package
+from pcii.evaluation.provenance import machine, software_of
 from tiny_datasets import OWN, write_dataset
 
 import pcii
 from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.provenance import machine, software_of
 from pcii.evaluation.rows import read_rows, writing_rows
 from pcii.store.software import differences, hash_of_source
 
