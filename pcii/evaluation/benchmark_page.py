@@ -128,9 +128,14 @@ def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
             ["method"],
             "column",
             full_n=of_scenes["scene"].nunique(),
+            bound=comparison.bound,
         ),
         "by_scene": mean_table(
-            f"By scene, at {TYPICAL_PHOTONS:g} photons per view", at_typical, ["scene"], "method"
+            f"By scene, at {TYPICAL_PHOTONS:g} photons per view",
+            at_typical,
+            ["scene"],
+            "method",
+            bound=comparison.bound,
         ),
     }
 

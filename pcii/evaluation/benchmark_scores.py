@@ -25,7 +25,7 @@ from pcii.evaluation.submissions import SUBMISSION, read_maps, read_submission, 
 from pcii.evaluation.tasks import Task, lights_of, tasks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.benchmark_layout import Definition
-from pcii.store.collection import Collection, Half, is_collection, open_collection, read_collection
+from pcii.store.collection import Collection, Half, open_collection, read_collection
 from pcii.store.dataset import FULL_LIGHT, Dataset, budget_of
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented
@@ -46,13 +46,10 @@ class BenchmarkHalf:
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
-    fault = InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
-    if not is_collection(path):
-        raise fault
     try:
         definition = Definition.model_validate(read_collection(path).get("recipe"))
-    except ValidationError:
-        raise fault from None
+    except (InputError, ValidationError):
+        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`") from None
     collection = open_collection(path)
     chosen: Collection = collection.where(lambda row: row["values"]["half"] == half)
     if not len(chosen):
@@ -120,7 +117,7 @@ def run_method(
     if not tasks:
         words = " or ".join(budgets) or "light that it takes"
         raise InputError(f"budget: no dataset of the {data.half} half that {method!r} can take has {words}")
-    about = {"method": named.name, "made": "run by pcii benchmark run", "command_name": named.command_name}
+    about = {"method": named.name, "made": "run by pcii benchmark run", "command_name": method}
     return _score(BenchmarkJob(tasks, data), data, out, about, executor, report)
 
 

@@ -1,6 +1,5 @@
 """Methods compared over many datasets: `pcii.evaluate`."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,29 +96,24 @@ def evaluate(
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
     """Dataset folders among `paths` and, for other folders, in them; `InputError` where there is none.
 
-    Unfinished datasets and folders seed_<n> without a manifest are included, so that opening them reports
-    what is missing.
+    Unfinished datasets are included, so that opening them reports what is missing.
     """
-    found: list[Path] = []
+    folders: list[Path] = []
     for path in map(Path, paths):
         if _is_begun(path):
-            found.append(path)
+            folders.append(path)
         elif not path.is_dir():
             raise InputError(f"{path}: there is no such dataset folder")
         elif is_collection(path):
-            found += [path / row["path"] for row in read_index(path)]
+            folders += [path / row["path"] for row in read_index(path)]
         else:
-            inside = [
-                folder
-                for folder in path.iterdir()
-                if folder.is_dir() and (_is_begun(folder) or re.fullmatch(r"seed_\d+", folder.name))
-            ]
+            inside = [each for each in path.iterdir() if _is_begun(each)]
             if not inside:
                 raise InputError(f"{path}: neither a finished dataset nor a folder of datasets")
-            found += sorted(inside, key=lambda folder: (len(folder.name), folder.name))
-    if not found:
+            folders += sorted(inside, key=lambda each: (len(each.name), each.name))
+    if not folders:
         raise InputError("datasets: name at least one dataset folder")
-    return found
+    return folders
 
 
 def _is_begun(folder: Path) -> bool:

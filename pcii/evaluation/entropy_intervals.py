@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from pcii.evaluation.summary import mean_interval
-from pcii.imaging.bright_regions import box_around
 from pcii.metrics.scoring import entropy_region
 from pcii.sections.photon_statistics import (
     pooled_estimate,
@@ -38,7 +37,6 @@ def entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth) 
     if counts.total < GROUPS or counts.events.n.size > MAX_EVENTS:
         return []
     regions = [entropy_region(sections.grid, truth, number, sections.z_mm) for number in sorted(truth.names)]
-    boxes = [box_around(region, (0, 0)) for region in regions]  # a small part of a large frame
     window_px = section_window_px(sections)
     samples = pooled_samples(sections, window_px)
 
@@ -49,10 +47,7 @@ def entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth) 
         )
         tops = pooled.max(axis=(0, 1, 2))
         return np.array(
-            [
-                [region_entropy_bits(plane[box], region[box], tops) for plane in pooled]
-                for box, region in zip(boxes, regions, strict=True)
-            ]
+            [[region_entropy_bits(plane, region, tops) for plane in pooled] for region in regions]
         )
 
     others = [

@@ -41,11 +41,6 @@ class NamedMethod:
             return named_method, (self.source,)
         return NamedMethod, (self.name, self.function)
 
-    @property
-    def command_name(self) -> str:
-        """What the method is called on a command line."""
-        return self.source or self.name
-
     def takes(self, *, full_light: bool) -> bool:
         """Whether it takes radiance (`full_light`) or photon counts; functions of depth take both."""
         if self.function is not None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.summary import means, means_over_scenes
+from pcii.evaluation.summary import SIGNS, means, means_over_scenes
 from pcii.evaluation.tables import Table, light_name, tables_of
 from pcii.figures.charts import accuracy_chart, calibration_chart
 from pcii.figures.panels import figure_uri
@@ -100,18 +100,14 @@ def write_evaluation(
 
 def _plots(table: "DataFrame") -> list[tuple[str, str]]:
     """Pictures of means by method and light, with what they show in words."""
-    methods_by_measure = {
-        measure: sorted(table["method"][table["measure"] == measure].unique()) for measure in AXES
-    }
-    iou, bad = methods_by_measure["iou"], methods_by_measure["bad_1px"]
-    plots = [
-        (accuracy_plot(table, iou, "iou"), "IoU of each method against photons and seconds"),
-        (
-            accuracy_plot(table, bad, "bad_1px"),
-            "Errors above 1 px of each method of depth against photons and seconds",
-        ),
-        (_calibration_plot(table, bad), "Share of correct depths against confidence, by photons per view"),
-    ]
+    plots: list[tuple[str, str]] = []
+    methods: list[str] = []
+    for measure in SIGNS:
+        methods = sorted(table["method"][table["measure"] == measure].unique())
+        plots.append(
+            (accuracy_plot(table, methods, measure), f"{AXES[measure]} against photons and time")
+        )
+    plots.append((_calibration_plot(table, methods), "share of correct depths against confidence, by light"))
     return [(image, text) for image, text in plots if image]
 
 

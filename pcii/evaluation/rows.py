@@ -20,7 +20,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
-from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
+from pcii.store.dataset import Budget, Dataset
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
 
 if TYPE_CHECKING:
@@ -35,17 +35,6 @@ EXPOSURE = "by exposure"
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
-
-
-def light_order(light: Budget) -> tuple[int, float]:
-    """Key that sorts lights: numbers of photons, then an exposure, then full light.
-
-    >>> sorted(["full-light", "by exposure", 300.0, 30.0], key=light_order)
-    [30.0, 300.0, 'by exposure', 'full-light']
-    """
-    if light == FULL_LIGHT:
-        return 2, 0.0
-    return (1, 0.0) if light is None or isinstance(light, str) else (0, float(light))
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -173,12 +162,19 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     ]
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
+    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
     numbers = frame.columns.difference([*texts, "light"])
     frame[numbers] = frame[numbers].astype("float64")
     frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
-    lights = sorted(set(frame["light"]), key=light_order)
+    # Numbers of photons, then an exposure, then full light.
+    lights = sorted(set(frame["light"]), key=lambda light: (isinstance(light, str), light))
     frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
     return frame
+
+
+def _encodable(text: str) -> str:
+    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
+    return text.encode(errors="backslashreplace").decode()
 
 
 def _of_depth(row: Row) -> Row:

@@ -67,40 +67,30 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
     """The tasks that a submission has results of.
 
     Whatever light it has masks or depth of, it has them of all datasets that have this light: else raises
-    `InputError`, as for folders that are no dataset or light, or hold no result.
+    `InputError`, as for files that are no result of a dataset and its light.
     """
-    names = {dataset.name for dataset in datasets}
-    for entry in sorted(folder.iterdir()):
-        if entry.is_dir() and entry.name not in names:
-            raise InputError(f"{entry}: there is no such dataset in this half")
-    tasks: list[Task] = []
-    for dataset in datasets:
-        lights: dict[str, Budget] = {light_folder(light): light for light in lights_of(dataset)}
-        for entry in sorted((folder / dataset.name).glob("*/")):
-            if entry.name not in lights:
-                known = ", ".join(lights)
-                raise InputError(f"{entry}: is no light of this dataset, of which there are {known}")
-            files = {MASKS: method, DEPTH_MAP: depth_name(method)}
-            kinds = [name for file, name in files.items() if (entry / file).is_file()]
-            if not kinds:
-                raise InputError(f"{entry}: has neither a depth map ({DEPTH_MAP}) nor masks ({MASKS})")
-            light = lights[entry.name]
-            named = [NamedMethod(name, _read_as_maps) for name in kinds]
-            tasks += [
-                Task(dataset, light, each) for each in named if each.takes(full_light=light == FULL_LIGHT)
-            ]
+    possible = {
+        folder / dataset.name / light_folder(light) / file: Task(
+            dataset, light, NamedMethod(name, _read_as_maps)
+        )
+        for dataset in datasets
+        for light in lights_of(dataset)
+        for file, name in ((MASKS, method), (DEPTH_MAP, depth_name(method)))
+        if file == DEPTH_MAP or light != FULL_LIGHT
+    }
+    for file in sorted(folder.glob("*/*/[!.]*")):
+        if file not in possible:
+            raise InputError(
+                f"{file}: is no result of this half; expected files DATASET/LIGHT/{DEPTH_MAP} or {MASKS}"
+            )
+    tasks = {file: task for file, task in possible.items() if file.is_file()}
     if not tasks:
         raise InputError(f"{folder}: has no results of a dataset of this half")
-    present = {(task.dataset.name, task.light, task.method.name) for task in tasks}
-    for name, light in dict.fromkeys((task.method.name, task.light) for task in tasks):
-        file = DEPTH_MAP if estimator_of(name) is not None else MASKS
-        for dataset in datasets:
-            if light in lights_of(dataset) and (dataset.name, light, name) not in present:
-                inside = folder / dataset.name / light_folder(light)
-                raise InputError(
-                    f"{inside / file}: is missing, and of this light it is needed of all datasets"
-                )
-    return tasks
+    kinds = {(task.light, task.method.name) for task in tasks.values()}
+    for file, task in possible.items():
+        if file not in tasks and (task.light, task.method.name) in kinds:
+            raise InputError(f"{file}: is missing, and of this light it is needed of all datasets")
+    return list(tasks.values())
 
 
 def read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:

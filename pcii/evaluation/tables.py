@@ -126,14 +126,18 @@ def mean_table(
     column: str,
     name: Callable[[Any], str] = str,
     full_n: int = 0,
+    bound: str = "",
 ) -> Table:
     """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
 
-    The best of a scene (if rows are of scenes), light and measure stands out, where another is worse. Where a
-    mean is of fewer than `full_n` values their number is said.
+    The best method of a scene (if rows are of scenes), light and measure stands out, where another is worse;
+    `bound` names what is no method. Where a mean is of fewer than `full_n` values their number is said.
     """
+    if not len(means):
+        return Table(title, (), ())
     contest = [key for key in ("scene", "light", "measure") if key in means]
     values = means["mean"] * means["measure"].astype(object).map(SIGNS).astype(float)
+    values = values.mask(means["method"].astype(object) == bound)
     groups = values.groupby([means[key] for key in contest], observed=True)
     is_best = (values == groups.transform("max")) & (values > groups.transform("min"))
     texts = [

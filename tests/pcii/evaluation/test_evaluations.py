@@ -21,7 +21,7 @@ from pcii.evaluation.comparison import Evaluation, evaluate, find_datasets
 from pcii.evaluation.rows import read_frame, read_rows
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest
+from pcii.store.dataset_layout import MANIFEST, MARKER, TRUTH, read_manifest
 from pcii.store.folders import ROWS
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap
@@ -306,8 +306,8 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
     rewrite_manifest(series / "seed_3", files=files)
     with pytest.raises(InputError, match="has no truth"):
         evaluate([series], out, methods=FAKES)
-    (series / "seed_4" / MANIFEST).unlink()
-    with pytest.raises(InputError, match=r"seed_4: not a finished dataset"):
+    (series / "seed_4" / MANIFEST).rename(series / "seed_4" / MARKER)
+    with pytest.raises(InputError, match=r"seed_4: unfinished"):
         evaluate([series], out)
     assert calls == []
     assert not out.exists()
