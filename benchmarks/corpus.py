@@ -165,30 +165,28 @@ def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def by_half_and_kind(
-    title: str,
-    evaluation: Evaluation,
-    entry_of: Mapping[str, Entry],
-    measure: str,
-    words: Callable[["DataFrame"], str],
-) -> Table:
-    """A table of a measure over the scenes of a half and kind, by method; a column for each light.
+def by_half_and_kind(title: str, own: "DataFrame", words: Callable[["DataFrame"], str]) -> Table:
+    """A measure of `scene_means` over the scenes of a half and kind, by method; a column for each light.
 
     `words` says in words what a table of means over seeds of several scenes has.
     """
     import pandas as pd
 
-    own = scene_means(evaluation, entry_of, measure)
-    both = pd.concat([own.assign(kind="all"), own])
-    lights = [light for light in own["light"].cat.categories if light in set(own["light"])]
+    return table_by_light(title, pd.concat([own.assign(kind="all"), own]), ["half", "kind", "method"], words)
+
+
+def table_by_light(
+    title: str, own: "DataFrame", keys: Sequence[str], words: Callable[["DataFrame"], str]
+) -> Table:
+    """What `words` says of each group of rows with the same `keys`, and the number of scenes, by light."""
+    lights = list(own["light"].cat.remove_unused_categories().cat.categories)
     rows: list[tuple[str, ...]] = []
-    groups: Any = both.groupby(["half", "kind", "method"])
+    groups: Any = own.groupby(list(keys))
     for names, of_names in groups:
         cells = dict(list(of_names.groupby("light", observed=True)))
         shown = [words(cells[light]) if light in cells else "–" for light in lights]
         rows.append((*names, str(of_names["scene"].nunique()), *shown))
-    header = ("half", "kind", "method", "scenes", *map(light_name, lights))
-    return Table(title, header, tuple(rows), words=3)
+    return Table(title, (*keys, "scenes", *map(light_name, lights)), tuple(rows), words=len(keys))
 
 
 def scene_means(evaluation: Evaluation, entry_of: Mapping[str, Entry], measure: str) -> "DataFrame":

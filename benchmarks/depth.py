@@ -4,13 +4,13 @@ The measure is bad_1px: the share of the objects' pixels whose depth is off by m
 disparity, or missing. A ratio below 1 is better than the better one of both plane sweeps.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from benchmarks.corpus import Entry, by_half_and_kind, evaluated, scene_means
+from benchmarks.corpus import Entry, by_half_and_kind, evaluated, scene_means, table_by_light
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
-from pcii.evaluation.tables import Table, light_name, markdown
+from pcii.evaluation.tables import markdown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -40,18 +40,6 @@ def report(evaluation: Evaluation, entry_of: Mapping[str, Entry]) -> Iterator[st
             return f"{mean:.3f}"
         return f"{mean:.3f} ({mean / simple.mean():.2f})"
 
-    title = "Mean errors of scenes of a kind"
-    for shown in (by_scene(own, words), by_half_and_kind(title, evaluation, entry_of, MEASURE, words)):
+    by_scene = table_by_light("Errors above 1 px by scene", own, ["half", "kind", "name", "method"], words)
+    for shown in (by_scene, by_half_and_kind("Mean errors of scenes of a kind", own, words)):
         yield f"\n{shown.title}\n\n{markdown(shown)}"
-
-
-def by_scene(own: "DataFrame", words: Callable[["DataFrame"], str]) -> Table:
-    """Errors of every scene and method, and their ratio; a column for each light."""
-    keys = ["half", "kind", "name", "method"]
-    lights = [light for light in own["light"].cat.categories if light in set(own["light"])]
-    rows = []
-    for names, of_names in own.groupby(keys):
-        cells = dict(list(of_names.groupby("light", observed=True)))
-        rows.append((*names, *(words(cells[light]) if light in cells else "–" for light in lights)))
-    header = ("half", "kind", "scene", "method", *map(light_name, lights))
-    return Table("Errors above 1 px by scene", header, tuple(rows), words=4)

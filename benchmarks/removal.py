@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 
-from benchmarks.corpus import Entry, by_half_and_kind, evaluated
+from benchmarks.corpus import Entry, by_half_and_kind, evaluated, scene_means
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.method_names import DEPTH
-from pcii.evaluation.tables import TITLES, Table, light_table, markdown, tables_of_scene
+from pcii.evaluation.tables import Table, markdown, tables_of
 from pcii.removal.methods import removal_methods
 
 
@@ -15,19 +15,14 @@ def table() -> Iterator[str]:
 
 
 def report(evaluation: Evaluation, entry_of: Mapping[str, Entry]) -> Iterator[str]:
-    """The tables of an evaluation, line by line; `entry_of` tells which scene a recipe is."""
-    frame, means = evaluation.frame, evaluation.means()
-    datasets = frame["identity"].nunique()
+    """The tables of an evaluation, one by one; `entry_of` tells which scene a recipe is."""
+    datasets = evaluation.frame["identity"].nunique()
     yield f"removal of defocused points, {datasets} datasets. In brackets: 95 % intervals of means over seeds"
-    for shown in (light_table(means, "iou", TITLES["iou"]), mean_iou(evaluation, entry_of)):
+    for shown in (*tables_of(evaluation.frame, evaluation.means()), mean_iou(evaluation, entry_of)):
         yield f"\n{shown.title}\n\n{markdown(shown)}"
-    for scene, own in frame.groupby("scene", observed=True):
-        yield f"\n{scene}"
-        for shown in tables_of_scene(own, means[means["scene"] == scene]):
-            yield f"\n{shown.title}\n\n{markdown(shown)}"
 
 
 def mean_iou(evaluation: Evaluation, entry_of: Mapping[str, Entry]) -> Table:
     """Mean over scenes of the mean object IoU, by half, kind and method; a column for each light."""
-    title = "Mean IoU of scenes of a kind"
-    return by_half_and_kind(title, evaluation, entry_of, "iou", lambda own: f"{own['mean'].mean():.3f}")
+    own = scene_means(evaluation, entry_of, "iou")
+    return by_half_and_kind("Mean IoU of scenes of a kind", own, lambda rows: f"{rows['mean'].mean():.3f}")

@@ -98,11 +98,11 @@ def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_lig
     text = "\n".join(depth.report(evaluation_of(errors, of_depth=True), ENTRIES))
     assert "10 datasets" in text
     for row in (
-        "| test | textured | stones | depth:focus | 0.500 | – |",
-        "| train | cluttered | slats | depth:focus | 0.750 (3.00) | – |",
-        "| train | cluttered | slats | depth:variance-sweep | 0.250 (1.00) | – |",
-        "| train | textured | balls | depth:focus | 0.250 (0.50) | 0.500 (2.00) |",
-        "| train | textured | balls | depth:variance-sweep | 0.750 (1.50) | 0.250 (1.00) |",
+        "| test | textured | stones | depth:focus | 1 | 0.500 | – |",
+        "| train | cluttered | slats | depth:focus | 1 | 0.750 (3.00) | – |",
+        "| train | cluttered | slats | depth:variance-sweep | 1 | 0.250 (1.00) | – |",
+        "| train | textured | balls | depth:focus | 1 | 0.250 (0.50) | 0.500 (2.00) |",
+        "| train | textured | balls | depth:variance-sweep | 1 | 0.750 (1.50) | 0.250 (1.00) |",
         # (0.25 + 0.75) / 2, and of the better sweeps (0.5 + 0.25) / 2.
         "| train | all | depth:focus | 2 | 0.500 (1.33) | 0.500 (2.00) |",
     ):

@@ -72,7 +72,7 @@ def score(
     """Score maps of depth and masks that were made elsewhere, after checking all of them.
 
     FOLDER has submission.json, and for each dataset and light a folder such as ramp_photons_1/1000 with
-    depth.npz, .pfm or .exr, or with masks.npz or mask_540.png and so on.
+    depth.npz, masks.npz or both.
 
     Example of use:
 

@@ -56,7 +56,7 @@ def evaluate(
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
-    Writes evaluation.html, evaluation.md and means.csv, and each score, as it is measured, to rows.jsonl.
+    Writes evaluation.html and means.csv, and each score, as it is measured, to rows.jsonl.
     Scores that other software made are made again.
 
     Examples of use:

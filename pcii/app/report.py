@@ -17,9 +17,9 @@ from pcii.app.report_tables import depth_table, entropy_table, key_facts, score_
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_bytes_safely
 from pcii.depth.methods import DEFAULT_METHOD
-from pcii.evaluation.method_names import depth_name
+from pcii.evaluation.method_names import NamedMethod, depth_name, software_of
 from pcii.evaluation.pages import page
-from pcii.evaluation.provenance import machine, software_of
+from pcii.store.software import machine
 
 COARSE_PX = 320
 """Smaller pictures are enlarged with sharp pixels."""
@@ -56,7 +56,9 @@ def origin(outcome: Outcome) -> list[tuple[str, str]]:
     """How the report and its dataset were made: names and values, folders by their names alone."""
     manifest = outcome.dataset.manifest
     methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))
-    versions = {name: text for method in methods for name, text in software_of(method).items()}
+    versions: dict[str, str] = {}
+    for method in methods:
+        versions |= software_of(NamedMethod(method)) or {}
     seconds = ", ".join(f"{name} {value:.2f} s" for name, value in outcome.timings_s.items())
     rows = [
         ("command", _command(outcome)),

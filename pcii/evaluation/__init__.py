@@ -1,17 +1,15 @@
 """Many datasets: rows, intervals, paired tests, tables and pages; and the public benchmark.
 
-benchmark_page     One page of all submissions in a folder: ranks, lines over light, best and worst scenes,
-                   and commands.
+benchmark_page     One page of all submissions in a folder: lines over light, tables, ranks, and commands.
 benchmark_scores   Scores of a method on the public benchmark: of one that is run here, or of maps that were
                    made elsewhere.
 comparison         Methods compared over many datasets: `pcii.evaluate`.
 entropy_intervals  Intervals of Table 1 for one dataset: how far the entropies would differ with other
                    photons.
 measurement        Measuring the tasks of an evaluation: a method is run, timed and scored against the truth.
-method_names       Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME.
+method_names       Methods of an evaluation by name, removal by its own, depth as depth:NAME; their software.
 pages              Pages: HTML made from templates, whose content is escaped as text, and the files of an
                    evaluation.
-provenance         What made a figure: the source and the weights of what computes, versions, and the machine.
 rows               Rows of an evaluation: rows.jsonl, which grows while methods are measured, and the frame
                    that they make.
 submissions        Results of the benchmark that were made elsewhere: a folder of maps of depth and masks,

@@ -1,47 +1,36 @@
-"""One page of all submissions in a folder: ranks, lines over light, best and worst scenes, and commands."""
+"""One page of all submissions in a folder: lines over light, tables, ranks, and commands."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene, picture_name, read_scores
+from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene, read_scores
 from pcii.evaluation.pages import accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import Kind, lines_of, mean_interval, means, ranks
-from pcii.evaluation.tables import TITLES, Table, light_name, rank_table, with_interval
-from pcii.figures.pictures import uri_of
+from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks
+from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
 from pcii.store.collection import IN_FRAMES
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-SCENES_NAMED = 3
-"""So many of the best and of the worst scenes of each method are shown."""
 MIN_PX = 1e-3
 """Smaller errors of depth count as this one where they are averaged as logarithms."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What methods are compared by: a measure, and the measure and name of the bound on it.
-
-    `sign` makes more better; without one there are no best and worst scenes. Means over scenes are of shares
-    or, without `is_share`, geometric.
-    """
+    """A measure that methods are compared by, and the measure and the name of the bound on it, if any."""
 
     title: str
     measure: str
     words: str
-    sign: int = 0
     bound_measure: str = ""
     bound: str = ""
-    is_share: bool = True
 
 
 COMPARISONS = (
@@ -49,23 +38,21 @@ COMPARISONS = (
         "Removal of defocused points",
         "iou",
         "IoU with the objects of each plane: more is better. The oracle knows the true depth of each pixel",
-        1,
         "iou_oracle",
         "oracle (masks from the true depth)",
     ),
-    Comparison("Depth", "bad_1px", "Share of pixels off by more than 1 px: less is better", -1),
+    Comparison("Depth", "bad_1px", "Share of pixels off by more than 1 px: less is better"),
     Comparison(
         "Error of depth",
         "median_px",
         "Median error of the pixels with an answer, geometric mean over scenes: less is better. The "
         "Cramér-Rao bound is the least standard deviation of the depth of an object as a whole, given its "
         "photons and its texture; median over the objects of a scene",
-        0,
         "bound_px",
         "bound for whole objects (Cramér-Rao)",
-        is_share=False,
     ),
 )
+GEOMETRIC: Mapping[str, Kind] = {"median_px": "geometric"}
 
 
 def write_page(folder: Path, out: Path) -> int:
@@ -94,16 +81,18 @@ def write_page(folder: Path, out: Path) -> int:
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
     about = next(iter(submissions.values()))
+    of_cells = means(frame)
     content = {
         "benchmark": about["benchmark"],
         "half": about["half"],
         "scenes": of_scenes["scene"].nunique(),
         "kinds": [
-            part for each in COMPARISONS if (part := _compare(each, frame, of_scenes, folder_of)) is not None
+            _compare(comparison, of_cells)
+            for comparison in COMPARISONS
+            if comparison.measure in set(of_cells["measure"])
         ],
-        "typical": f"{TYPICAL_PHOTONS:g}",
         "ranks": [
-            rank_table(ranks(of_scenes, measure), measure, f"{title} over all scenes")
+            rank_table(ranks(of_scenes, measure), f"{title} over all scenes")
             for measure, title in TITLES.items()
         ],
         "submissions": _submission_table(submissions, folder_of, frame),
@@ -112,125 +101,68 @@ def write_page(folder: Path, out: Path) -> int:
     return len(submissions)
 
 
-def _compare(
-    comparison: Comparison, frame: "DataFrame", of_scenes: "DataFrame", folder_of: Mapping[str, Path]
-) -> dict[str, Any] | None:
-    """What the page says of methods by one measure; None if there are none."""
-    values = _values(comparison, of_scenes)
-    if not len(values):
-        return None
-    methods = sorted({*values["method"]} - {comparison.bound})
-    lines = [*methods, *({comparison.bound} & {*values["method"]})]
-    over_scenes = _over_scenes(comparison, values)
+def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
+    """What the page says of methods by one measure, from the means of `summary.means`."""
+    import pandas as pd
+
+    measure = comparison.measure
+    values = _values(comparison, of_cells)
+    of_scenes = values[~values["scene"].astype(str).str.endswith(IN_FRAMES)]
+    is_geometric = of_scenes["measure"].isin(list(GEOMETRIC))
+    of_scenes = of_scenes.assign(mean=of_scenes["mean"].mask(is_geometric, of_scenes["mean"].clip(MIN_PX)))
+    over_scenes = means_over_scenes(of_scenes, GEOMETRIC)
+    accuracy = over_scenes[over_scenes["measure"] == measure]
+    is_time = (over_scenes["measure"] == "seconds") & (over_scenes["light"] == TYPICAL_PHOTONS)
+    times = over_scenes[is_time].assign(column=f"seconds at {TYPICAL_PHOTONS:g}")
+    by_light = pd.concat([accuracy.assign(column=accuracy["light"].map(light_name).astype(object)), times])
+    columns = [*map(light_name, accuracy["light"].unique()), *times["column"].unique()]
+    by_light["column"] = pd.Categorical(by_light["column"], columns)
+    at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
     return {
         "title": comparison.title,
         "words": comparison.words,
-        "plot": accuracy_plot(over_scenes, lines, comparison.measure),
-        "table": _table_by_light(comparison, over_scenes, lines, of_scenes["scene"].nunique()),
-        "by_scene": _table_by_scene(_values(comparison, frame), lines),
-        "scenes": [
-            _best_and_worst(comparison, values, method, folder_of[method])
-            for method in methods
-            if comparison.sign
-        ],
+        "plot": accuracy_plot(over_scenes, list(values["method"].cat.categories), measure),
+        "table": mean_table(
+            "By photons per view",
+            by_light,
+            ["method"],
+            "column",
+            full_n=of_scenes["scene"].nunique(),
+            bound=comparison.bound,
+        ),
+        "by_scene": mean_table(
+            f"By scene, at {TYPICAL_PHOTONS:g} photons per view",
+            at_typical,
+            ["scene"],
+            "method",
+            bound=comparison.bound,
+        ),
     }
 
 
-def _values(comparison: Comparison, frame: "DataFrame") -> "DataFrame":
-    """Means over seeds: `method` (or bound), `light`, `scene`, `value`, `photons_per_view`, `seconds`."""
+def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
+    """Means of the measure, photons and seconds of the methods that have it, the bound as the last method."""
     import pandas as pd
 
-    keys = ["scene", "light", "method"]
-    table = means(frame).pivot(index=keys, columns="measure", values="mean").reset_index()
-    columns = [*keys, "value", "photons_per_view", "seconds"]
-    if comparison.measure not in table:
-        return pd.DataFrame(columns=columns)
-    table = table.reindex(columns=[*dict.fromkeys([*table.columns, *columns, comparison.bound_measure])])
-    table["value"] = table[comparison.measure]
-    table = table[table["value"].notna()]
-    if comparison.bound:
-        known = table[table[comparison.bound_measure].notna()].drop_duplicates(
-            ["scene", "light"], keep="last"
-        )
-        bounds = known.assign(method=comparison.bound, value=known[comparison.bound_measure], seconds=np.nan)
-        table = pd.concat([table, bounds])
-    return table[columns]
+    def of(*measures: str) -> "DataFrame":
+        return of_cells[of_cells["measure"].isin(measures)]
 
-
-def _over_scenes(comparison: Comparison, values: "DataFrame") -> "DataFrame":
-    """Means over scenes of the measure, photons and seconds, by method and light."""
-    import pandas as pd
-
-    rows: list[dict[str, Any]] = []
-    for (light, method), own in values.groupby(["light", "method"], observed=True):
-        kinds: dict[str, Kind] = {"photons_per_view": "positive", "seconds": "positive"}
-        kinds["value"] = "share" if comparison.is_share else "geometric"
-        for column, kind in kinds.items():
-            known = own[column].dropna()
-            if len(known):
-                measure = comparison.measure if column == "value" else column
-                known = known.clip(lower=MIN_PX) if kind == "geometric" else known
-                mean = mean_interval(known.to_list(), kind)
-                rows.append({"light": light, "method": method, "measure": measure, **mean._asdict()})
-    return pd.DataFrame(rows)
-
-
-def _table_by_light(comparison: Comparison, over_scenes: "DataFrame", lines: list[str], scenes: int) -> Table:
-    """The measure of each method at each light, the mean over scenes with its interval, and its time.
-
-    Where it has the measure of fewer than all `scenes` their number is said.
-    """
-    cells = {(row.method, row.light, row.measure): row for row in lines_of(over_scenes)}
-    lights = list(over_scenes["light"].unique())
-    rows = []
-    for method in lines:
-        texts = [method]
-        for light in lights:
-            row = cells.get((method, light, comparison.measure))
-            few = f" of {row.n} scenes" if row is not None and row.n < scenes else ""
-            texts.append("–" if row is None else with_interval(row.mean, row.low, row.high) + few)
-        row = cells.get((method, TYPICAL_PHOTONS, "seconds"))
-        texts.append("–" if row is None else with_interval(row.mean, row.low, row.high, 2))
-        rows.append(tuple(texts))
-    header = ("method", *map(light_name, lights), f"seconds at {TYPICAL_PHOTONS:g}")
-    return Table("By photons per view", header, tuple(rows))
-
-
-def _table_by_scene(values: "DataFrame", lines: list[str]) -> Table:
-    """The measure of each method on each scene at `TYPICAL_PHOTONS`, means over seeds."""
-    cells = _typical(values).pivot(index="scene", columns="method", values="value")
-    cells = cells[[method for method in lines if method in cells]]
-    rows = [
-        (str(scene), *("–" if np.isnan(value) else f"{value:.3f}" for value in row))
-        for scene, row in zip(cells.index, cells.to_numpy().tolist(), strict=True)
-    ]
-    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *cells.columns), tuple(rows))
-
-
-def _typical(values: "DataFrame") -> "DataFrame":
-    return values[values["light"] == TYPICAL_PHOTONS]
-
-
-def _best_and_worst(comparison: Comparison, values: "DataFrame", method: str, folder: Path) -> dict[str, Any]:
-    """Scenes that a method does best and worst at `TYPICAL_PHOTONS`, each with its score and picture."""
-    own = _typical(values[values["method"] == method]).assign(
-        order=lambda table: -comparison.sign * table["value"]
-    )
-    pairs = own.sort_values("order", kind="stable")[["scene", "value"]].to_numpy().tolist()
-    scenes = []
-    for scene, value in (
-        pairs if len(pairs) <= 2 * SCENES_NAMED else pairs[:SCENES_NAMED] + pairs[-SCENES_NAMED:]
-    ):
-        file = folder / picture_name(comparison.measure, scene)
-        picture = uri_of("webp", file.read_bytes()) if file.is_file() else None
-        scenes.append({"name": scene, "score": f"{value:.2f}", "picture": picture})
-    return {"method": method, "scenes": scenes}
+    has_measure = of(comparison.measure)[["scene", "light", "method"]]
+    values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)
+    methods = sorted(has_measure["method"].unique())
+    bounds = of(comparison.bound_measure).merge(has_measure).drop_duplicates(["scene", "light"], keep="last")
+    if len(bounds):
+        photons = of("photons_per_view").merge(bounds[["scene", "light", "method"]])
+        bounds = pd.concat([bounds.assign(measure=comparison.measure), photons])
+        values = pd.concat([values, bounds.assign(method=comparison.bound)])
+        methods.append(comparison.bound)
+    return values.assign(method=pd.Categorical(values["method"], methods))
 
 
 def _submission_table(
     submissions: Mapping[Path, Mapping[str, Any]], folder_of: Mapping[str, Path], frame: "DataFrame"
 ) -> Table:
-    """Whose each method is, what it took, and the command that measures it again, in a folder of its own."""
+    """Whose each method is, and the command that measures it again, in a folder of its own."""
     rows = []
     for method, folder in sorted(folder_of.items()):
         about = submissions[folder]
@@ -241,10 +173,8 @@ def _submission_table(
                 method,
                 str(about.get("authors", "–")),
                 str(about.get("url", "–")),
-                f"{about['peak_memory_mb']} MB" if is_run else "–",
                 str(len(frame[frame["method"] == method].drop_duplicates(["identity", "light"]))),
                 f"pcii benchmark {work} --data BENCHMARK --half {about['half']} -o submissions/{folder.name}",
             )
         )
-    header = ("method", "authors", "url", "memory at most", "scores", "command")
-    return Table("Submissions", header, tuple(rows), words=3)
+    return Table("Submissions", ("method", "authors", "url", "scores", "command"), tuple(rows), words=3)

@@ -1,6 +1,5 @@
 """Methods compared over many datasets: `pcii.evaluate`."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +12,7 @@ from pcii.evaluation import summary
 from pcii.evaluation.measurement import EvaluationJob, measure
 from pcii.evaluation.method_names import Method, named_methods
 from pcii.evaluation.pages import write_evaluation
-from pcii.evaluation.provenance import origin_of
-from pcii.evaluation.rows import frame_of, key_of, writing_rows
+from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
 from pcii.evaluation.tasks import tasks_of
 from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import open_dataset
@@ -68,10 +66,10 @@ def evaluate(
     those that recipes name. `executor` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
-    unless other software made them (see `pcii.store.software`). evaluation.html, evaluation.md, means.csv and
+    unless other software made them (see `pcii.store.software`). evaluation.html, means.csv and
     evaluation.json summarise the last row of each. The seconds of a row are the wall time of the method
-    alone, after a warm-up call, in a call in which no code was compiled or imported; where several processes
-    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
+    alone, after a warm-up call at the first dataset of each light; where several processes work at a time,
+    each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
     radiance, for an unknown method or budget, for a named method that cannot take the data of a dataset, and
     while another process evaluates into the same folder:
 
@@ -98,29 +96,24 @@ def evaluate(
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
     """Dataset folders among `paths` and, for other folders, in them; `InputError` where there is none.
 
-    Unfinished datasets and folders seed_<n> without a manifest are included, so that opening them reports
-    what is missing.
+    Unfinished datasets are included, so that opening them reports what is missing.
     """
-    found: list[Path] = []
+    folders: list[Path] = []
     for path in map(Path, paths):
         if _is_begun(path):
-            found.append(path)
+            folders.append(path)
         elif not path.is_dir():
             raise InputError(f"{path}: there is no such dataset folder")
         elif is_collection(path):
-            found += [path / row["path"] for row in read_index(path)]
+            folders += [path / row["path"] for row in read_index(path)]
         else:
-            inside = [
-                folder
-                for folder in path.iterdir()
-                if folder.is_dir() and (_is_begun(folder) or re.fullmatch(r"seed_\d+", folder.name))
-            ]
+            inside = [each for each in path.iterdir() if _is_begun(each)]
             if not inside:
                 raise InputError(f"{path}: neither a finished dataset nor a folder of datasets")
-            found += sorted(inside, key=lambda folder: (len(folder.name), folder.name))
-    if not found:
+            folders += sorted(inside, key=lambda each: (len(each.name), each.name))
+    if not folders:
         raise InputError("datasets: name at least one dataset folder")
-    return found
+    return folders
 
 
 def _is_begun(folder: Path) -> bool:

@@ -1,17 +1,16 @@
 """Measuring the tasks of an evaluation: a method is run, timed and scored against the truth."""
 
-import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
-from typing import Any, TypeVar
+from statistics import median
+from typing import Any
 
 from pcii.base.executor import Executor
 from pcii.base.progress import Report
 from pcii.depth.methods import estimate_depth
-from pcii.evaluation.method_names import estimator_of
-from pcii.evaluation.provenance import machine, software_of_method
+from pcii.evaluation.method_names import estimator_of, software_of
 from pcii.evaluation.rows import Row, RowFile, describe_dataset, identity_of
 from pcii.evaluation.tasks import Task
 from pcii.metrics.bounds import object_bounds
@@ -19,17 +18,12 @@ from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Budget, Dataset
-from pcii.store.software import differences
+from pcii.store.software import differences, machine
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
-
-Result = TypeVar("Result")
-MAX_CALLS = 4
-"""One call may import modules, one may compile further loops, one is timed and one is spare. A method that
-imports or compiles in every call is timed with that."""
 
 
 def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Report) -> tuple[str, ...]:
@@ -39,7 +33,7 @@ def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Rep
     `InputError` for a task that fails.
     """
     tasks = job.tasks
-    software = {task.method.name: software_of_method(task.method) for task in tasks}
+    software = {task.method.name: software_of(task.method) for task in tasks}
     pieces: list[int] = []
     methods_by_change: dict[str, list[str]] = {}
     for number, task in enumerate(tasks):
@@ -76,7 +70,7 @@ class EvaluationJob:
         task = self.tasks[piece]
         name = task.method.name
         if name not in self._software:  # that of this process, which may be on another machine
-            self._software[name] = software_of_method(task.method)
+            self._software[name] = software_of(task.method)
         data = task.data
         seen, truth = data.counts_or_views, data.truth
         seconds, estimate = self.estimate(task, data)
@@ -91,7 +85,7 @@ class EvaluationJob:
         }
         if isinstance(estimate, DepthMap):
             depth = dict(score(None, estimate, truth, grid=data.grid).depth)
-            return row | {"depth": depth} | self._bounds(task, data, seen)
+            return row | {"depth": depth} | self._bound(task, data, seen)
         result = score(estimate, None, truth)
         planes = [
             {name: value for name, value in (bound | plane).items() if name != "method"}
@@ -114,14 +108,16 @@ class EvaluationJob:
         if (task.light, task.method.name) not in self._warm:
             work()
             self._warm.add((task.light, task.method.name))
-        return timed(work)
+        start = time.perf_counter()
+        result = work()
+        return time.perf_counter() - start, result
 
     def full_light_of(self, task: Task) -> Dataset:
         """The dataset from whose radiance the texture of a task's objects is known, if it has any."""
         return task.dataset
 
-    def _bounds(self, task: Task, data: Dataset, seen: PhotonCounts | Views) -> Row:
-        """`bounds` of the depth of objects from these photons, if there is radiance to know textures from."""
+    def _bound(self, task: Task, data: Dataset, seen: PhotonCounts | Views) -> Row:
+        """`bound_px`, the median of the objects, if there is radiance from which their textures are known."""
         lit, truth, z_mm = self.full_light_of(task), data.truth, task.z_mm
         views = lit.views
         if not isinstance(seen, PhotonCounts) or views is None or not (z_mm or data.analysis.get("z_mm")):
@@ -132,25 +128,6 @@ class EvaluationJob:
             self._lit_sections = identity, reconstruct(views, planes)
         # By their origin where that is known, so no sections are needed to count photons.
         sections = None if truth.photons is not None else reconstruct(seen, planes)
-        return {"bounds": {"objects": object_bounds(truth, self._lit_sections[1], sections)}}
-
-
-def timed(work: Callable[[], Result]) -> tuple[float, Result]:
-    """Seconds of a call of `work()`, and its result.
-
-    A call during which Numba compiled a loop or read one from its cache, or a module was imported, is
-    repeated, and the last call counts. Which loops a method needs depends on the data, so a warm-up on other
-    data does not suffice.
-    """
-    from numba.core import event
-
-    for call in range(1, MAX_CALLS + 1):
-        modules = len(sys.modules)
-        # Numba locks its compiler both to compile and to read its cache.
-        with event.install_recorder("numba:compiler_lock") as locked:
-            start = time.perf_counter()
-            result = work()
-            seconds = time.perf_counter() - start
-        if call == MAX_CALLS or (not locked.buffer and len(sys.modules) == modules):
-            return seconds, result
-    raise AssertionError
+        bounds = object_bounds(truth, self._lit_sections[1], sections)
+        known = [each["depth_sigma_px"] for each in bounds if each["depth_sigma_px"] is not None]
+        return {"bound_px": median(known)} if known else {}

@@ -10,8 +10,11 @@ from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function, name_of
+from pcii.depth import methods as depth
 from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
+from pcii.removal import methods as removal
 from pcii.removal.methods import removal_methods
+from pcii.store.software import own_software, software_with
 
 DEPTH = "depth"
 """Names the default estimator of depth, which has its full name in rows."""
@@ -38,16 +41,27 @@ class NamedMethod:
             return named_method, (self.source,)
         return NamedMethod, (self.name, self.function)
 
-    @property
-    def command_name(self) -> str:
-        """What the method is called on a command line."""
-        return self.source or self.name
-
     def takes(self, *, full_light: bool) -> bool:
         """Whether it takes radiance (`full_light`) or photon counts; functions of depth take both."""
         if self.function is not None:
             return not full_light or estimator_of(self.name) is not None
         return self.name in methods_for(full_light=full_light)
+
+
+def software_of(method: NamedMethod) -> dict[str, str] | None:
+    """All software that the result of a method follows from: versions, and hashes of sources.
+
+    For a method of another package this is also the source of that package. The source
+    is every file of a package, so also the weights of a network. None for a function that has no source.
+    """
+    estimator = estimator_of(method.name)
+    if method.source:
+        return software_with((estimator_of(method.source) or method.source).rpartition(":")[0])
+    if method.function is not None:
+        return None
+    registry, name = (removal, method.name) if estimator is None else (depth, estimator)
+    point = registry.REGISTRY.point_of(name)
+    return own_software() if point is None else software_with(point.module)
 
 
 def depth_name(estimator: str) -> str:

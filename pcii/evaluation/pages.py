@@ -10,20 +10,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from pcii.base.plain_text import in_markdown, visible
+from pcii.base.plain_text import visible
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.summary import SIGNS, means, ranks
-from pcii.evaluation.tables import (
-    DEPTH,
-    REMOVAL,
-    Table,
-    light_name,
-    markdown,
-    tables_of_all,
-    tables_of_scene,
-)
+from pcii.evaluation.summary import SIGNS, means, means_over_scenes
+from pcii.evaluation.tables import Table, light_name, tables_of
 from pcii.figures.charts import accuracy_chart, calibration_chart
 from pcii.figures.panels import figure_uri
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
@@ -31,8 +21,6 @@ from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-MAX_DETAILED_SCENES = 12
-"""Up to so many scenes each has plots and tables of its own; more make a page that nobody can load."""
 AXES = {
     "iou": "IoU, mean over planes",
     "bad_1px": "share of errors of depth above 1 px",
@@ -40,15 +28,15 @@ AXES = {
 }
 """Measures of accuracy that are drawn, with the labels of their axes."""
 NOTES = (
-    "Scores compare masks with the objects that belong to each plane, and are means over the planes unless a "
-    "plane is named. In brackets: 95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for "
-    "shares, and of the logarithm of the mean for seconds and other values that are never negative.",
-    "In bold: the best mean at the same photons, and of the same scene. Others may be as good: see the "
-    "interval of the difference.",
+    "Scores compare masks with the objects that belong to each plane, and are means over the planes. In "
+    "brackets: 95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the "
+    "logarithm of the mean for seconds and other values that are never negative.",
+    "In bold: the best mean of the same scene and photons. Others may be as good: see the interval of the "
+    "difference.",
     "p: two-sided sign-flip permutation test on the same datasets, without correction for multiple "
     "comparisons. Of n pairs it cannot be less than 2 / 2^n, so fewer than six never give 0.05.",
-    "Over all scenes: every scene counts once, as the mean over its seeds, and all methods are compared on "
-    "the same scenes and seeds. Intervals and p are of the spread between scenes.",
+    "Over several scenes every scene counts once, as the mean over its seeds. Ranks are of the scenes and "
+    "seeds that all methods have; their intervals and p are of the spread between scenes.",
     "Depth: errors are in px of total disparity, over the objects' pixels, and less is better; a missing "
     "answer is an error above 1 px. Bound: the least standard deviation of the depth of an object as a whole "
     "(Cramér-Rao), median of the objects. ECE: how far confidence and the share of depths within 1 px are "
@@ -87,69 +75,38 @@ def page(template: str, content: dict[str, Any], script: str | None = None) -> b
 def write_evaluation(
     out: Path, frame: "DataFrame", origin: Mapping[str, Any], others: Sequence[str] = ()
 ) -> None:
-    """Write evaluation.md, evaluation.html, means.csv and, last, evaluation.json with their hashes.
+    """Write evaluation.html, means.csv and, last, evaluation.json with their hashes.
 
     `others` are further files to list. The caller keeps others from adding rows meanwhile.
     """
     sweep_temporaries(out)
     of_cells = means(frame)
-    ranked = {measure: ranks(frame, measure) for measure in SIGNS}
-    scenes = list(frame["scene"].cat.categories)
-    is_detailed = len(scenes) <= MAX_DETAILED_SCENES
-    methods = {measure: _methods_with(frame, measure) for measure in SIGNS}
+    differing = ", ".join(origin["differing"])
+    warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
     content = {
-        "notes": [*NOTES, *_warnings(origin)],
-        "plots": _plots(_over_scenes(frame, ranked), methods),
-        "tables": tables_of_all(of_cells, ranked),
-        "scenes": [_details(frame, of_cells, scene, methods) for scene in scenes if is_detailed],
-        "origin": _origin_table(frame, origin, hash_file(out / ROWS)),
+        "notes": [*NOTES, warning] if differing else NOTES,
+        "plots": _plots(of_cells if frame["scene"].nunique() == 1 else means_over_scenes(of_cells, {})),
+        "tables": list(tables_of(frame, of_cells)),
+        "origin": _origin_table(origin, hash_file(out / ROWS)),
     }
-    shown = of_cells["measure"].isin([*REMOVAL, *DEPTH, "photons_per_view"])
     files = {
-        "evaluation.md": _markdown(content).encode(),
         "evaluation.html": page("evaluation.html.j2", content),
-        "means.csv": of_cells[shown].to_csv(index=False).encode(errors="backslashreplace"),
+        "means.csv": of_cells.to_csv(index=False).encode(),
     }
     for name, text in files.items():
         write_bytes_safely(out / name, text)
     EVALUATION_FOLDER.write(out, {**origin, "files": list_files(out, [ROWS, *files, *others])})
 
 
-def _warnings(origin: Mapping[str, Any]) -> list[str]:
-    if not origin["differing"]:
-        return []
-    differing = ", ".join(origin["differing"])
-    return [f"Not all rows are of the same software ({differing}): name all datasets and methods again."]
-
-
-def _methods_with(frame: "DataFrame", measure: str) -> list[str]:
-    return sorted(frame["method"][frame[measure].notna()].unique()) if measure in frame else []
-
-
-def _details(
-    frame: "DataFrame", of_cells: "DataFrame", scene: str, methods: Mapping[str, Sequence[str]]
-) -> dict[str, Any]:
-    """Plots and tables of one scene."""
-    own, means_of_scene = (table[table["scene"] == scene] for table in (frame, of_cells))
-    return {
-        "label": scene,
-        "datasets": own["identity"].nunique(),
-        "recipe": own["recipe"].iloc[0],
-        "plots": _plots(means_of_scene, methods),
-        "tables": tables_of_scene(own, means_of_scene),
-    }
-
-
-def _over_scenes(frame: "DataFrame", ranked: Mapping[str, "DataFrame"]) -> "DataFrame":
-    """Means over scenes of what methods are compared by, with mean photons and seconds."""
-    import pandas as pd
-
-    tables = [table.assign(measure=measure) for measure, table in ranked.items()]
-    groups = frame.groupby(["light", "method"], observed=True)
-    for name in ("photons_per_view", "seconds"):
-        table = groups[name].mean().dropna().reset_index(name="mean")
-        tables.append(table.assign(measure=name, low=np.nan, high=np.nan))
-    return pd.concat([table for table in tables if len(table)])
+def _plots(table: "DataFrame") -> list[tuple[str, str]]:
+    """Pictures of means by method and light, with what they show in words."""
+    plots: list[tuple[str, str]] = []
+    methods: list[str] = []
+    for measure in SIGNS:
+        methods = sorted(table["method"][table["measure"] == measure].unique())
+        plots.append((accuracy_plot(table, methods, measure), f"{AXES[measure]} against photons and time"))
+    plots.append((_calibration_plot(table, methods), "share of correct depths against confidence, by light"))
+    return [(image, text) for image, text in plots if image]
 
 
 def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> str:
@@ -180,50 +137,14 @@ def _calibration_plot(table: "DataFrame", methods: Sequence[str]) -> str:
     return figure_uri(calibration_chart(bins.assign(light=bins["light"].map(light_name)), methods))
 
 
-def _plots(table: "DataFrame", methods: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
-    """Pictures of means by method and light, with what they show in words."""
-    iou, bad = methods["iou"], methods["bad_1px"]
-    plots = [
-        (accuracy_plot(table, iou, "iou"), "IoU of each method against photons and seconds"),
-        (
-            accuracy_plot(table, bad, "bad_1px"),
-            "Errors above 1 px of each method of depth against photons and seconds",
-        ),
-        (_calibration_plot(table, bad), "Share of correct depths against confidence, by photons per view"),
-    ]
-    return [(image, text) for image, text in plots if image]
-
-
-def _markdown(content: Mapping[str, Any]) -> str:
-    blocks = ["# Evaluation", *content["notes"]]
-    for table in content["tables"]:
-        blocks += [f"## {table.title}", markdown(table)]
-    for scene in content["scenes"]:
-        blocks.append(f"## {in_markdown(scene['label'])}")
-        blocks += [f"### {table.title}\n\n{markdown(table)}" for table in scene["tables"]]
-    blocks += [f"## {content['origin'].title}", markdown(content["origin"])]
-    return "\n\n".join(blocks) + "\n"
-
-
-def _origin_table(frame: "DataFrame", origin: Mapping[str, Any], rows_sha256: str) -> Table:
-    """How to cite an evaluation, and what it was made by; `rows_sha256` is that of its rows.jsonl."""
-    counts = [(frame[name].nunique(), name) for name in ("method", "identity", "scene")]
-    methods, datasets, scenes = (
-        f"{n} {name.replace('identity', 'dataset')}{'' if n == 1 else 's'}" for n, name in counts
-    )
-    days = f", measured {' to '.join(dict.fromkeys(origin['days']))}" if origin["days"] else ""
+def _origin_table(origin: Mapping[str, Any], rows_sha256: str) -> Table:
+    """What an evaluation was made by; `rows_sha256` is that of its rows.jsonl."""
     rows = [
-        (
-            "to cite",
-            f"Evaluation of {methods} on {datasets} of {scenes} by photon-integral-imaging "
-            f"{origin['version']}{days}; SHA-256 of rows.jsonl {rows_sha256}",
-        ),
+        ("measured", " to ".join(dict.fromkeys(origin["days"]))),
         ("machine", _counted(origin["machines"])),
         *((name, _counted(numbers)) for name, numbers in origin["software"].items()),
-        ("datasets", f"SHA-256 of their identities {origin['datasets']}"),
+        ("SHA-256 of rows.jsonl", rows_sha256),
     ]
-    if origin["unknown"]:
-        rows.append(("software not known", f"{origin['unknown']} rows: of functions"))
     return Table("How this was made", ("what", "value"), tuple(row for row in rows if row[1]), words=2)
 
 

@@ -6,21 +6,21 @@ software made it, is added below, and the last row counts.
 The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
 docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
 other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
-blur, `entropy_gap_bits`, `bad_1px` and the other errors of depth, with dots for what is nested, `bound_px`.
+blur, `bad_1px` and the other errors of depth, with dots for what is nested, `bound_px`.
 """
 
 import json
 import os
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import IO, TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
-from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
+from pcii.store.dataset import Budget, Dataset
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
 
 if TYPE_CHECKING:
@@ -35,17 +35,6 @@ EXPOSURE = "by exposure"
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
-
-
-def light_order(light: Budget) -> tuple[int, float]:
-    """Key that sorts lights: numbers of photons, then an exposure, then full light.
-
-    >>> sorted(["full-light", "by exposure", 300.0, 30.0], key=light_order)
-    [30.0, 300.0, 'by exposure', 'full-light']
-    """
-    if light == FULL_LIGHT:
-        return 2, 0.0
-    return (1, 0.0) if light is None or isinstance(light, str) else (0, float(light))
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -157,13 +146,16 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
 
     labels = _labels(rows)
     records = [
-        {"scene": labels[row["title"], row["recipe"]], "light": _light(row["budget"])}
+        {
+            "scene": labels[row["title"], row["recipe"]],
+            "light": EXPOSURE if row["budget"] is None else row["budget"],
+        }
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
         | measured
         for row in rows
-        for measured in (_of_depth(row) if "depth" in row else _of_planes(row))
+        for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
     ]
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
@@ -171,13 +163,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     numbers = frame.columns.difference([*texts, "light"])
     frame[numbers] = frame[numbers].astype("float64")
     frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
-    lights = sorted(set(frame["light"]), key=light_order)
+    # Numbers of photons, then an exposure, then full light.
+    lights = sorted(set(frame["light"]), key=lambda light: (isinstance(light, str), light))
     frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
     return frame
-
-
-def _light(budget: Budget) -> float | str:
-    return EXPOSURE if budget is None else budget
 
 
 def _encodable(text: str) -> str:
@@ -185,71 +174,61 @@ def _encodable(text: str) -> str:
     return text.encode(errors="backslashreplace").decode()
 
 
-def _of_depth(row: Row) -> Iterable[Row]:
-    sigmas = [
-        entry["depth_sigma_px"]
-        for entry in row.get("bounds", {}).get("objects", ())
-        if entry["depth_sigma_px"] is not None
-    ]
-    bound = {"bound_px": median(sigmas)} if sigmas else {}
-    return [dict(_leaves(row["depth"])) | bound]
+def _of_depth(row: Row) -> Row:
+    return dict(_leaves(row["depth"])) | ({"bound_px": row["bound_px"]} if "bound_px" in row else {})
 
 
 def _of_planes(row: Row) -> Iterable[Row]:
     """A record for each plane, with its scores against both kinds of truth."""
     records: dict[float, Row] = {}
-    gaps = _entropy_gaps(row)
     for plane in row["planes"]:
-        z_mm, is_of_objects = plane["z_mm"], plane["truth"] == "object"
-        record = records.setdefault(z_mm, {"z_mm": z_mm, "objects": None})
+        record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
         scores = {name: plane[name] for name in plane if name not in ("z_mm", "object", "truth")}
-        if is_of_objects:
-            own = [gaps[name] for name in (plane["object"] or "").split(", ") if name in gaps]
-            record |= {"objects": plane["object"], "entropy_gap_bits": min(own, default=None)}
-        record |= scores if is_of_objects else {f"pixel_{name}": scores[name] for name in scores}
+        if plane["truth"] == "object":
+            record |= {"objects": plane["object"]} | scores
+        else:
+            record |= {f"pixel_{name}": scores[name] for name in scores}
     return records.values()
-
-
-def _entropy_gaps(row: Row) -> dict[str, float]:
-    """By how many bits the entropy of each object is lower at its plane than at the best other one."""
-    plane_of = object_planes(row["planes"])
-    gaps: dict[str, float] = {}
-    for entry in row.get("objects", ()):
-        bits = {z: value for z, value in entry["entropy"].items() if value is not None}
-        own = bits.pop(plane_of.get(entry["name"], ""), None)
-        if own is not None and bits:
-            gaps[entry["name"]] = min(bits.values()) - own
-    return gaps
-
-
-def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Depth of the plane that each object belongs to, spelled as in the keys of `Score.objects`."""
-    return {name: f"{row['z_mm']:g}" for row in planes for name in (row["object"] or "").split(", ") if name}
 
 
 def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
     """By title and recipe: the title, with the settings that distinguish it from others of the same title."""
-    settings: dict[str, dict[str, Mapping[str, Any]]] = {}
+    settings: dict[str, dict[str, dict[str, str]]] = {}
     for row in rows:
-        settings.setdefault(row["title"], {}).setdefault(row["recipe"], row.get("settings", {}))
+        texts = {
+            name: value if isinstance(value, str) else json.dumps(value)
+            for name, value in row.get("settings", {}).items()
+        }
+        settings.setdefault(row["title"], {}).setdefault(row["recipe"], texts)
     labels: dict[tuple[str, str], str] = {}
     for title, by_recipe in settings.items():
-        texts = {
-            recipe: {
-                name: value if isinstance(value, str) else json.dumps(value) for name, value in own.items()
-            }
-            for recipe, own in by_recipe.items()
-        }
-        names = dict.fromkeys(name for own in texts.values() for name in own)
-        differing = [name for name in names if len({own.get(name) for own in texts.values()}) > 1]
+        names = dict.fromkeys(name for own in by_recipe.values() for name in own)
+        differing = [name for name in names if len({own.get(name) for own in by_recipe.values()}) > 1]
         words = {
             recipe: [f"{name}={own[name]}" for name in differing if name in own]
-            for recipe, own in texts.items()
+            for recipe, own in by_recipe.items()
         }
         for recipe, own in words.items():
-            if (
-                len(words) > 1 and list(words.values()).count(own) > 1
-            ):  # a scene was changed, or has no recipe
-                own = [*own, f"recipe {recipe[:8]}"]
-            labels[title, recipe] = f"{title} ({', '.join(own)})" if own else title
+            # A scene that was changed, or has no recipe, differs in no setting.
+            is_unique = len(words) == 1 or list(words.values()).count(own) == 1
+            parts = own if is_unique else [*own, f"recipe {recipe[:8]}"]
+            labels[title, recipe] = f"{title} ({', '.join(parts)})" if parts else title
     return labels
+
+
+def origin_of(rows: Sequence[Row]) -> dict[str, Any]:
+    """What measured rows: how many each version of each package, and each machine, did; first and last day.
+
+    `differing` names what has several versions or sources.
+    """
+    software: dict[str, Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        for name, number in (row.get("software") or {}).items():
+            software[name][number] += 1
+    days = sorted(row["date"] for row in rows if "date" in row)
+    return {
+        "software": {name: dict(numbers) for name, numbers in software.items()},
+        "differing": sorted(name for name, numbers in software.items() if len(numbers) > 1),
+        "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
+        "days": [days[0], days[-1]] if days else [],
+    }

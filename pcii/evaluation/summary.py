@@ -3,7 +3,7 @@
 All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed alone are one scene.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", 
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage"}
 SHARES |= {"badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 SHARES |= {"ece", "share", "confidence", "correct"}
-SIGNED = {"bias_px", "entropy_gap_bits"}
+SIGNED = {"bias_mm", "bias_px"}
 SIGNS = {"iou": 1, "bad_1px": -1}
 """What methods of removal and of depth are compared by, and the sign that makes more better."""
 
@@ -109,11 +109,6 @@ def sign_flip_p(differences: np.ndarray) -> tuple[np.ndarray, float]:
     return np.asarray(test.pvalue), 2 / 2**n if is_exact else 2 / (1 + RANDOM_FLIPS)
 
 
-def measures_of(frame: "DataFrame") -> list[str]:
-    """Columns of a frame that hold what was measured."""
-    return [column for column in frame.columns if column not in NO_MEASURES]
-
-
 def kind_of(measure: str) -> Kind:
     """What interval the mean of a measure has."""
     name = measure.removeprefix("pixel_").rpartition(".")[2]
@@ -132,16 +127,31 @@ def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
     """
     import pandas as pd
 
-    values = _by_dataset(frame, by)
-    parts = [_group_means(values[measure], by, kind_of(measure), measure) for measure in values.columns]
+    keys = [*by, "seed", "identity"]
+    measures = [column for column in frame.columns if column not in NO_MEASURES]
+    values = frame[[*keys, *measures]].groupby(keys, observed=True, dropna=False).mean()
+    parts = [
+        _group_means(values[measure], by, kind_of(measure), measure)
+        for measure in measures
+        if values[measure].notna().any()
+    ]
     return pd.concat(parts, ignore_index=True)
 
 
-def _by_dataset(frame: "DataFrame", by: Sequence[str]) -> "DataFrame":
-    """Means over the planes of each dataset; rows in the order of `by` and of seeds."""
-    keys = [*by, "seed", "identity"]
-    groups = frame[[*keys, *measures_of(frame)]].groupby(keys, observed=True, dropna=False)
-    return groups.mean().dropna(axis="columns", how="all")
+def means_over_scenes(of_cells: "DataFrame", kinds: Mapping[str, Kind]) -> "DataFrame":
+    """Means over scenes of the means of `means`, by light and method, with the same columns.
+
+    Intervals are of the spread between scenes. `kinds` are those of measures that do not have `kind_of`.
+    """
+    import pandas as pd
+
+    by = ["light", "method"]
+    values = of_cells.set_index([*by, "scene"]).sort_index()
+    parts = [
+        _group_means(own["mean"], by, kinds.get(str(measure), kind_of(str(measure))), str(measure))
+        for measure, own in values.groupby("measure", sort=False)
+    ]
+    return pd.concat(parts, ignore_index=True)
 
 
 def _group_means(values: "Series", by: Sequence[str], kind: Kind, measure: str) -> "DataFrame":

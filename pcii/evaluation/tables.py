@@ -1,6 +1,6 @@
 """Tables of an evaluation as text, the same for HTML and Markdown."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -8,16 +8,12 @@ import numpy as np
 
 from pcii.base.plain_text import in_markdown
 from pcii.evaluation.rows import EXPOSURE
-from pcii.evaluation.summary import CELL, SIGNS, lines_of, means, ranks
+from pcii.evaluation.summary import SIGNS, lines_of, ranks
 from pcii.store.dataset import FULL_LIGHT, Budget
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Column = tuple[str, Callable[[Any], str]]
-"""The name of a column, and what an entry says in it."""
-METHOD: Column = ("method", lambda entry: entry["method"])
-NAMES = {"iou": "IoU", "bad_1px": "bad_1px"}
 TITLES = {"iou": "IoU", "bad_1px": "Errors of depth above 1 px"}
 """What methods of removal and of depth are compared by."""
 REMOVAL = {
@@ -28,24 +24,24 @@ REMOVAL = {
     "claimed_share": "claimed share",
     "photon_precision": "photon precision",
     "photon_recall": "photon recall",
-    "entropy_gap_bits": "entropy gap, bits",
     "seconds": "seconds",
 }
 """Measures of removal in tables, and the names of their columns."""
-OF_OBJECTS, OF_ALL_PIXELS = "hci_objects.badpix_007", "hci.badpix_007"
 DEPTH = {
     "median_px": "median, px",
     "bound_px": "bound, px",
     "bias_px": "bias, px",
     "bad_1px": "bad_1px",
     "bad_3px": "bad_3px",
-    OF_OBJECTS: "BadPix(0.07)",
-    OF_ALL_PIXELS: "BadPix(0.07), all pixels",
+    "hci_objects.badpix_007": "BadPix(0.07)",
+    "hci.badpix_007": "BadPix(0.07), all pixels",
     "coverage": "answered",
     "ece": "ECE",
     "seconds": "seconds",
 }
-"""The same of depth. BadPix of all pixels stands for that of objects where surfaces have no names."""
+"""The same of depth."""
+MAX_DETAILED_SCENES = 12
+"""Up to so many scenes have tables of all measures; those of more make a page that nobody can load."""
 
 
 @dataclass(frozen=True)
@@ -60,20 +56,6 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     words: int = 1
     best: frozenset[tuple[int, int]] = frozenset()
-
-
-def tabulated(
-    title: str,
-    columns: Sequence[Column],
-    entries: Sequence[Any],
-    words: int = 1,
-    best: Mapping[str, set[int]] | None = None,
-) -> Table:
-    """A row for each entry; of `best` the numbers of the rows that stand out in the columns of its names."""
-    names = tuple(name for name, _ in columns)
-    rows = tuple(tuple(of(entry) for _, of in columns) for entry in entries)
-    cells = {(row, names.index(name)) for name, numbers in (best or {}).items() for row in numbers}
-    return Table(title, names, rows, words, frozenset(cells))
 
 
 def markdown(table: Table) -> str:
@@ -108,79 +90,73 @@ def light_name(light: Budget) -> str:
     return EXPOSURE if light is None else f"{light:g}" if not isinstance(light, str) else light
 
 
-def tables_of_all(of_cells: "DataFrame", ranked: Mapping[str, "DataFrame"]) -> list[Table]:
-    """Ranks over all scenes, then means by scene and light: of methods of removal, then of depth."""
-    tables = [rank_table(ranked[name], name, f"{title} over all scenes") for name, title in TITLES.items()]
-    tables += [light_table(of_cells, name, f"{title} by photon budget") for name, title in TITLES.items()]
-    return [table for table in tables if table.rows]
+def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
+    """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
+
+    `of_cells` are the means of `frame` by scene, light and method.
+    """
+    scenes = frame["scene"].nunique()
+    over = "scene" if scenes > 1 else "identity"
+    for (decisive, title), names in zip(TITLES.items(), (REMOVAL, DEPTH), strict=True):
+        own = of_cells[of_cells["measure"] == decisive]
+        if not len(own):
+            continue
+        ranked = ranks(frame, decisive, over)
+        if len(ranked):
+            unit = "scenes" if over == "scene" else "datasets"
+            yield rank_table(ranked, f"{title}, methods compared on the same {unit}", unit)
+        yield mean_table(f"{title} by photon budget", own, ["scene", "method"], "light", light_name)
+        if scenes <= MAX_DETAILED_SCENES:
+            yield _measure_table(f"{title} beside other measures", of_cells, own, names)
 
 
-def tables_of_scene(frame: "DataFrame", of_cells: "DataFrame") -> list[Table]:
-    """What was measured of one scene in full: removal, depth and comparisons; without empty ones."""
-    tables = [_results(frame, of_cells, "iou", REMOVAL), _results(frame, of_cells, "bad_1px", DEPTH)]
-    for name, title in TITLES.items():
-        title = f"{title}, methods compared on the same datasets"
-        tables.append(rank_table(ranks(frame, name, "identity"), name, title, "datasets"))
-    return [table for table in tables if table.rows]
-
-
-def light_table(of_cells: "DataFrame", measure: str, title: str) -> Table:
-    """A measure of every scene and method by light; `of_cells` is of `summary.means`."""
-    table = _with_texts(of_cells[of_cells["measure"] == measure], ["scene", "light"], measure)
-    return _pivoted(title, table, ["scene", "method"], "light", light_name)
-
-
-def _with_texts(table: "DataFrame", contest: Sequence[str], measure: str, digits: int = 3) -> "DataFrame":
-    """The table with its means as `text`, and which is the best of its contest, where another is worse."""
-    ends = zip(table["mean"], table["low"], table["high"], strict=True)
-    values = SIGNS.get(measure, 0) * table["mean"]
-    groups = values.groupby([table[name] for name in contest], observed=True)
-    is_best = (values == groups.transform("max")) & (values > groups.transform("min"))
-    return table.assign(text=[with_interval(*mean, digits) for mean in ends], is_best=is_best)
-
-
-def _pivoted(
-    title: str, table: "DataFrame", rows: Sequence[str], column: str, name: Callable[[Any], str] = str
-) -> Table:
-    """A table of texts with the columns `rows` and one for each value of `column`."""
-    cells = table.pivot(index=list(rows), columns=column, values=["text", "is_best"])
-    if not len(cells):
-        return Table(title, (), ())
-    texts = cells["text"].sort_index(axis="columns").fillna("–")
-    marked = np.argwhere(cells["is_best"].sort_index(axis="columns").eq(True).to_numpy())
-    index = texts.index.to_frame()
-    if "light" in index:
-        index["light"] = [light_name(light) for light in index["light"]]
-    lines = map(tuple, np.hstack([index.to_numpy(object), texts.to_numpy(object)]).tolist())
-    best = frozenset((int(row), len(rows) + int(number)) for row, number in marked)
-    return Table(title, (*rows, *map(name, texts.columns)), tuple(lines), len(rows), best)
-
-
-def _results(frame: "DataFrame", of_cells: "DataFrame", decisive: str, names: Mapping[str, str]) -> Table:
-    """Results of one scene by method and light; the best of a light by the decisive measure stand out."""
+def _measure_table(title: str, of_cells: "DataFrame", own: "DataFrame", names: Mapping[str, str]) -> Table:
+    """The measures `names` of the methods that `own` is of, by scene, light and method."""
     import pandas as pd
 
-    methods = of_cells["method"][of_cells["measure"] == decisive].unique()
-    table = of_cells[of_cells["method"].isin(methods)]
-    shown = [name for name in names if name in set(table["measure"])]
-    if OF_OBJECTS in shown:
-        shown = [name for name in shown if name != OF_ALL_PIXELS]
-    if decisive == "iou" and frame["z_mm"].nunique() > 1:
-        planes = means(frame[[*CELL, "seed", "identity", "z_mm", decisive]], (*CELL, "z_mm"))
-        planes = planes.assign(measure=[f"IoU, {z:g} mm" for z in planes["z_mm"]])
-        shown = [*planes["measure"].unique(), *shown]
-        table = pd.concat([table, planes])
-    parts = []
-    for name in shown:
-        digits = 2 if names.get(name, "").endswith((" px", "seconds")) else 3
-        parts.append(_with_texts(table[table["measure"] == name], ["light"], name, digits))
-    everything = pd.concat(parts) if parts else _with_texts(table, ["light"], "")
-    everything["measure"] = pd.Categorical(everything["measure"], shown)
-    title = "Removal of defocused points" if decisive == "iou" else "Depth"
-    return _pivoted(title, everything, ["light", "method"], "measure", lambda name: names.get(name, name))
+    shown = of_cells[of_cells["measure"].isin(list(names)) & of_cells["method"].isin(own["method"].unique())]
+    shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
+    return mean_table(title, shown, ["scene", "light", "method"], "measure", lambda name: names[name])
 
 
-def rank_table(table: "DataFrame", measure: str, title: str, unit: str = "scenes") -> Table:
+def mean_table(
+    title: str,
+    means: "DataFrame",
+    rows: Sequence[str],
+    column: str,
+    name: Callable[[Any], str] = str,
+    full_n: int = 0,
+    bound: str = "",
+) -> Table:
+    """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
+
+    The best method of a scene (if rows are of scenes), light and measure stands out, where another is worse;
+    `bound` names what is no method. Where a mean is of fewer than `full_n` values their number is said.
+    """
+    if not len(means):
+        return Table(title, (), ())
+    contest = [key for key in ("scene", "light", "measure") if key in means]
+    values = means["mean"] * means["measure"].astype(object).map(SIGNS).astype(float)
+    values = values.mask(means["method"].astype(object) == bound)
+    groups = values.groupby([means[key] for key in contest], observed=True)
+    is_best = (values == groups.transform("max")) & (values > groups.transform("min"))
+    texts = [
+        with_interval(row.mean, row.low, row.high) + (f" of {row.n}" if row.n < full_n else "")
+        for row in lines_of(means[["mean", "low", "high", "n"]])
+    ]
+    cells = means.assign(text=texts, is_best=is_best)
+    cells = cells.pivot(index=list(rows), columns=column, values=["text", "is_best"])
+    shown = cells["text"].sort_index(axis="columns").fillna("–")
+    marked = np.argwhere(cells["is_best"].sort_index(axis="columns").eq(True).to_numpy())
+    index = shown.index.to_frame()
+    if "light" in index:
+        index["light"] = [light_name(light) for light in index["light"]]
+    lines = map(tuple, np.hstack([index.to_numpy(object), shown.to_numpy(object)]).tolist())
+    best = frozenset((int(row), len(rows) + int(number)) for row, number in marked)
+    return Table(title, (*rows, *map(name, shown.columns)), tuple(lines), len(rows), best)
+
+
+def rank_table(table: "DataFrame", title: str, unit: str = "scenes") -> Table:
     """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
     rows = [
         (
@@ -194,6 +170,5 @@ def rank_table(table: "DataFrame", measure: str, title: str, unit: str = "scenes
         )
         for row in lines_of(table)
     ]
-    header = ("method", "photons", "rank", f"mean {NAMES[measure]}", "minus that of the best")
-    header += ("p", "least p possible", unit)
+    header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible", unit)
     return Table(title, header, tuple(rows))

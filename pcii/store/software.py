@@ -1,6 +1,7 @@
 """The software that a result follows from: versions, hashes of sources, and how those differ."""
 
 import hashlib
+import os
 import platform
 from collections.abc import Mapping
 from functools import cache
@@ -36,6 +37,17 @@ def software_with(place: str) -> dict[str, str]:
     assert spec is not None
     source = next(iter(spec.submodule_search_locations or ()), spec.origin)
     return own_software() | {f"source of {package}": hash_of_source(Path(str(source)))}
+
+
+def machine() -> str:
+    """Processor and system, without a name by which the machine could be found."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = f"{models[0]} ({platform.machine()})" if models else platform.machine()
+    return f"{processor}, {os.cpu_count()} logical cores, {platform.system()}"
 
 
 def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:

@@ -105,10 +105,9 @@ def test_a_difference_of_one_byte_is_a_difference() -> None:
 def test_results_of_an_evaluation_become_rows() -> None:
     head = {"title": "balls", "recipe": "r", "identity": "1", "dataset": "balls", "budget": 100.0}
     head |= {"seed": 1, "photons_per_view": 100.0, "seconds": 0.5}
-    bounds = {"objects": [{"name": "ball", "depth_sigma_px": 0.25}]}
     planes = [{"z_mm": 1.0, "truth": "object", "object": "ball", "iou": 0.8}]
     measured = [
-        {"method": "depth:posterior", "depth": {"bad_1px": 0.1, "median_px": None}, "bounds": bounds},
+        {"method": "depth:posterior", "depth": {"bad_1px": 0.1, "median_px": None}, "bound_px": 0.25},
         {"method": "depth:variance-sweep", "depth": {"bad_1px": 0.4}},
         {"method": "likelihood", "planes": planes, "objects": []},
     ]

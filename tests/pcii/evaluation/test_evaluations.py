@@ -6,11 +6,9 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numba as nb
 import numpy as np
 import pandas as pd
 import pytest
-from slow_clock import SlowClock
 from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
@@ -20,10 +18,10 @@ from pcii.base.errors import InputError
 from pcii.base.executor import Executor
 from pcii.evaluation import measurement
 from pcii.evaluation.comparison import Evaluation, evaluate, find_datasets
-from pcii.evaluation.rows import read_frame, read_rows, writing_rows
+from pcii.evaluation.rows import read_frame, read_rows
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest
+from pcii.store.dataset_layout import MANIFEST, MARKER, TRUTH, read_manifest
 from pcii.store.folders import ROWS
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap
@@ -105,42 +103,18 @@ def test_every_figure_by_hand(evaluated: Evaluation) -> None:
 
 def test_the_files_hold_the_same_figures(evaluated: Evaluation) -> None:
     out = evaluated.folder
-    assert verify(out) == len({ROWS, "evaluation.html", "evaluation.md", "means.csv"})
+    assert verify(out) == len({ROWS, "evaluation.html", "means.csv"})
     pd.testing.assert_frame_equal(read_frame(out), evaluated.frame)
     table = pd.read_csv(out / "means.csv")
     iou = table[(table["measure"] == "iou") & (table["light"] == OWN)].set_index("method")
     assert iou.at["by count", "mean"] == mean_of(evaluated, OWN, "by count", "iou").mean
-    text = (out / "evaluation.md").read_text()
+    page = (out / "evaluation.html").read_text()
+    rows = [re.sub("<td[^>]*>", "", line).split("</td>")[:-1] for line in page.splitlines()]
     # Equal differences of the nested light, 1 - 10 / 48, have an interval without width.
-    assert (
-        "| two rows | 20 | 2 | 0.208 (0.208 to 0.208) | -0.792 (-0.792 to -0.792) | 0.25 | 0.25 | 3 |" in text
-    )
-    assert "| by hand | by count | **1.000 (1.000 to 1.000)** | **0.850 (0.726 to 0.974)** |" in text
-
-
-def entropy_row(bits_of: dict[str, tuple[float, float]]) -> dict[str, Any]:
-    planes = [
-        {"z_mm": z, "object": name, "truth": "object", "iou": 0.5}
-        for z, name in ((540.0, "ball"), (620.0, "bird"))
-    ]
-    objects = [
-        {"name": name, "entropy": dict(zip(("540", "620"), bits, strict=True))}
-        for name, bits in bits_of.items()
-    ]
-    head = {"dataset": "d", "identity": "1", "recipe": "r", "title": "t", "seed": 1, "budget": 1000.0}
-    return head | {
-        "method": "m",
-        "photons_per_view": 1.0,
-        "seconds": 1.0,
-        "planes": planes,
-        "objects": objects,
-    }
-
-
-def test_table_1_is_the_gap_of_the_entropies(tmp_path: Path) -> None:
-    with writing_rows(tmp_path / "out") as file:
-        file.add(entropy_row({"ball": (1.0, 1.5), "bird": (1.0, 1.25)}))
-    assert read_frame(tmp_path / "out")["entropy_gap_bits"].tolist() == [0.5, -0.25]
+    mean, difference = "0.208 (0.208 to 0.208)", "-0.792 (-0.792 to -0.792)"
+    assert ["<tr>two rows", "20", "2", mean, difference, "0.25", "0.25", "3"] in rows
+    best = [f"<strong>{text}</strong>" for text in ("1.000 (1.000 to 1.000)", "0.850 (0.726 to 0.974)")]
+    assert ["<tr>by hand", "by count", *best] in rows
 
 
 def change_recipe(dataset: Path, **settings: Any) -> None:
@@ -170,27 +144,6 @@ def test_scenes_come_in_the_order_of_the_datasets_with_the_settings_that_differ(
     assert list(again.frame["scene"].cat.categories) == [labels[4], *labels[:4]]
 
 
-def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
-    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    loop, clock, calls = nb.njit(lambda n: n + 1), SlowClock(monkeypatch), 0
-
-    def late(counts: Any, sections: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        if counts.total != first_total:  # of the first dataset: the others take another path
-            clock.go_on(1 if loop.signatures else 100)
-            loop(counts.total)
-        clock.go_on(1)
-        return by_count(counts, sections)
-
-    monkeypatch.setitem(METHODS, "late", late)
-    first_total = open_dataset(series / "seed_3").counts.total
-    evaluation = evaluate([series], tmp_path / "out", methods=["late"], budgets=[OWN])
-    assert calls == 5  # three, the warm-up and the one that compiled
-    assert sorted(evaluation.frame["seconds"]) == [1, 1, 2, 2, 2, 2]
-
-
 def test_a_depth_map_without_estimates_is_reported_as_such(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -200,7 +153,7 @@ def test_a_depth_map_without_estimates_is_reported_as_such(
     assert frame[["ece", "mae_mm"]].isna().all(axis=None)
     assert frame["coverage"].tolist() == [0.0] * 3
     assert frame["bad_1px"].tolist() == [1.0] * 3
-    assert "### Depth" in (tmp_path / "out" / "evaluation.md").read_text()
+    assert "Errors of depth above 1 px by photon budget" in (tmp_path / "out" / "evaluation.html").read_text()
 
 
 def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, calls: list[str]) -> None:
@@ -353,8 +306,8 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
     rewrite_manifest(series / "seed_3", files=files)
     with pytest.raises(InputError, match="has no truth"):
         evaluate([series], out, methods=FAKES)
-    (series / "seed_4" / MANIFEST).unlink()
-    with pytest.raises(InputError, match=r"seed_4: not a finished dataset"):
+    (series / "seed_4" / MANIFEST).rename(series / "seed_4" / MARKER)
+    with pytest.raises(InputError, match=r"seed_4: unfinished"):
         evaluate([series], out)
     assert calls == []
     assert not out.exists()
