@@ -85,4 +85,3 @@ Budget = Annotated[
     str | None,
     Parameter(help="Use the photons of this smaller, nested budget, or full-light: the radiance alone."),
 ]
-Json = Annotated[bool, Parameter(name="--json")]

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.app.pipeline import Method, Outcome, analyse
+from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
@@ -61,8 +61,8 @@ def run(
     out: Path,
     planes: FocalPlanes,
     z_range_mm: tuple[float, float],
-    methods: Sequence[Method] = (),
-    depth_method: Method = DEFAULT_METHOD,
+    methods: Sequence[str] = (),
+    depth_method: str = DEFAULT_METHOD,
     report: Report = silent,
 ) -> Outcome:
     """Analyse `dataset`, and write all results with a report into `out`, in the place of earlier ones.

@@ -1,38 +1,31 @@
 """Commands that analyse one dataset: all steps, sections, depth, removal, score."""
 
 from pathlib import Path
-from typing import Literal
-
-import numpy as np
 
 from pcii.app import results
 from pcii.app.command_options import (
     Budget,
     DatasetFolder,
     DepthRange,
-    Json,
     ResultsOut,
     SectionDepths,
     budget_words,
     dataset_at,
 )
 from pcii.app.pipeline import full_light_sections
-from pcii.base.command_line import answer, answer_json, say, say_next, say_next_page
+from pcii.app.report_pictures import block_estimates
+from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
-from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
+from pcii.figures.exposure import encoded
+from pcii.figures.pictures import depth_image, mask_image, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
-from pcii.sections import reconstruction
-from pcii.sections.demosaicing import demosaic
+from pcii.sections.reconstruction import reconstruct as reconstruct_sections
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
 from pcii.store.suggested_depths import depth_range_of, planes_of
-from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes
-
-LOW_DEPTH_SHARE = 0.05
-"""A depth map that answers for a smaller share of the pixels is warned of."""
 
 
 def run(
@@ -72,7 +65,6 @@ def run(
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
-    _warn_of_few_depths(outcome.depth, data)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
 
@@ -83,7 +75,6 @@ def reconstruct(
     out: ResultsOut,
     z_mm: SectionDepths = (),
     subpixel: int = 1,
-    shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
 ) -> None:
     """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
@@ -97,24 +88,15 @@ def reconstruct(
     ----------
     subpixel
         Divide each pixel into this many voxels per axis.
-    shifts
-        `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
-        sections = reconstruction.reconstruct(data.counts_or_views, planes, subpixel=subpixel, shifts=shifts)
+        sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
         results.save_sections(folder, sections)
-        for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
-            estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
-            if sections.cfa is not None:
-                estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
-            picture = to_srgb8(estimate, white_level(estimate))
+        for z, picture in zip(sections.z_mm, encoded(block_estimates(sections, 1)), strict=True):
             write_png(folder / f"section_{z:g}mm.png", picture)
     say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
-    saturated = int(np.count_nonzero(sections.saturated))
-    if saturated:
-        say(f"{saturated} of {sections.counts.size} voxels are saturated: their estimate is infinite")
     if data.has_counts:
         depths = (f"--z-mm={z:g}" for z in z_mm)
         say_next("pcii", "segment", dataset, *depths, "-o", out, *budget_words(data))
@@ -149,7 +131,6 @@ def depth(
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
     say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, paler where less sure")
-    _warn_of_few_depths(depth_map, data)
     _say_next_score(data, out)
 
 
@@ -188,20 +169,17 @@ def segment(
     _say_next_score(data, out)
 
 
-def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
+def score(dataset: DatasetFolder, out: Path) -> None:
     """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
     Examples of use:
 
         pcii score out/paper out/paper-results
-        pcii score out/paper out/depth --json
 
     Parameters
     ----------
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
-    json
-        Print the score too, as score.json has it.
     """
     data, light = open_dataset(dataset), read_results(out)["light"]
     data = data if light is None else data.at_budget(light)
@@ -216,28 +194,11 @@ def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
             focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
         )
         results.save_score(folder, result)
-    if json:
-        answer_json(result.to_dict())
-        return
     say(f"{out / results.SCORE}")
     if data.truth is None:
         say("the dataset has no truth: what is compared with it is null")
     else:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
-
-
-def _warn_of_few_depths(depth_map: DepthMap, data: Dataset) -> None:
-    """Say how little of a depth map has an answer, and what is the most likely reason."""
-    share, grid = float(np.isfinite(depth_map.z_mm).mean()), data.grid
-    if share >= LOW_DEPTH_SHARE:
-        return
-    if min(grid.rows, grid.cols) == 1:
-        reason = f"the {grid.rows} x {grid.cols} cameras stand in a line, and see depth at few edges"
-    elif data.has_counts:
-        reason = f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
-    else:
-        reason = "the views show too little texture"
-    answer(f"warning: {share:.1%} of the pixels have a depth, most likely since {reason}")
 
 
 def _say_next_score(data: Dataset, out: Path) -> None:
