@@ -60,15 +60,12 @@ def analyse(
     find_depth_method(depth_method, data)
     if counts is not None:
         check_depth_counts(counts)
-    steps = [*(f"removal, {name}" for name in removals), "sections at full light", "depth", "score"]
-    seconds, finished = dict.fromkeys(["sections", *steps] if removals else steps, 0.0), list[str]()
+    seconds: dict[str, float] = {}
 
     def timed(step: str, work: Callable[[], Result]) -> Result:
         start = time.perf_counter()
         result = work()
         seconds[step] = round(time.perf_counter() - start, 3)
-        finished.append(step)
-        report("analysis", len(finished), len(seconds))
         return result
 
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
@@ -82,6 +79,7 @@ def analyse(
             assert counts is not None
             assert sections is not None
             focus.append(timed(f"removal, {name}", partial(remove, counts, sections)))
+            report("removal", len(focus), len(removals))
         full_light, depth_map = light.result(), depth.result()
     sections = full_light if sections is None else sections
     assert sections is not None

@@ -16,6 +16,7 @@ from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.progress import Stages
+from pcii.base.safe_files import write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.exposure import encoded
 from pcii.figures.pictures import depth_image, mask_image, write_png
@@ -24,6 +25,7 @@ from pcii.removal import methods as removal
 from pcii.sections.reconstruction import reconstruct as reconstruct_sections
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
+from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.focal_planes import FocalPlanes
 
@@ -161,11 +163,10 @@ def segment(
     with results.writing(out, data) as folder:
         focus = removal.segment(data.counts, planes, method=method)
         results.save_segmented(folder, focus)
-        names = [f"in_focus_{focus.method}_{z:g}mm.png" for z in focus.z_mm]
-        for name, mask in zip(names, focus.in_focus, strict=True):
-            write_png(folder / name, mask_image(mask))
-    for name, mask in zip(names, focus.in_focus, strict=True):
-        say(f"{out / name}: {mask.mean():.2%} of the section in focus")
+        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+            write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
+    for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+        say(f"{z:g} mm: {mask.mean():.2%} of the section in focus")
     _say_next_score(data, out)
 
 
@@ -181,10 +182,10 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
-    data, light = open_dataset(dataset), read_results(out)["light"]
-    data = data if light is None else data.at_budget(light)
+    data, manifest = open_dataset(dataset), read_results(out)
+    data = data if manifest.light is None else data.at_budget(manifest.light)
     focus, depth_map = results.load_estimates(out, data)
-    if difference := results.other_software(out):
+    if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")
     z_mm = data.analysis.get("z_mm")
     planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
@@ -193,7 +194,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         result = scoring.score(
             focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
         )
-        results.save_score(folder, result)
+        write_json_safely(folder / results.SCORE, result.to_dict())
     say(f"{out / results.SCORE}")
     if data.truth is None:
         say("the dataset has no truth: what is compared with it is null")

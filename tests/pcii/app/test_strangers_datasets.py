@@ -76,7 +76,7 @@ def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
 
 def test_methods_for_photon_counts_say_what_to_do_with_images() -> None:
     views = Views(LIGHT, GRID)
-    with pytest.raises(InputError, match="expected PhotonCounts .*of Views pcii.limit_photons"):
+    with pytest.raises(InputError, match=r"expected PhotonCounts .*of Views pcii\.limit_photons"):
         segment(views, 500)  # type: ignore[arg-type]
 
 
