@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import zarr
 from cyclopts import App
-from PIL import Image
 
 from pcii.app import commands as pcii_cli
 from pcii.base import command_line
@@ -108,20 +107,6 @@ def test_run_takes_the_methods_it_is_told(
     rows = json.loads((out / "score.json").read_text())["planes"]
     assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
     assert "shape-from-focus" in (out / "report.html").read_text()
-
-
-def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
-    small_dataset: Path, tmp_path: Path
-) -> None:
-    command = ["reconstruct", str(small_dataset), "--z-mm", "580", "--shifts", "even", "-o", str(tmp_path)]
-    assert command_line.run(pcii_cli.app, command) == 0
-    group = zarr.open_group(tmp_path / "sections.zarr", mode="r")
-    assert group.attrs["cfa"] == "GRBG"
-    counts = np.asarray(group["counts"])
-    assert counts.shape == (1, 256, 256, 1)
-    assert 0.5 * 36 * 4000 < counts.sum() < 36 * 4400  # what does not move out of the picture
-    with Image.open(tmp_path / "section_580mm.png") as picture:
-        assert np.asarray(picture).std(axis=2).max() > 10  # grey would have none
 
 
 def test_bad_input_to_simgen_is_refused_in_one_sentence(

@@ -1,7 +1,7 @@
 """Options that several commands take: folders, depths, a light, methods."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +12,6 @@ from pcii.types.arrays import MOST_DEPTHS
 
 if TYPE_CHECKING:
     from cyclopts import Token
-
-Function = Callable[..., Any]
 
 
 def depths_mm(text: str) -> list[float]:
@@ -85,4 +83,3 @@ Budget = Annotated[
     str | None,
     Parameter(help="Use the photons of this smaller, nested budget, or full-light: the radiance alone."),
 ]
-Json = Annotated[bool, Parameter(name="--json")]

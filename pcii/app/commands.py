@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pcii.app.benchmark_commands import benchmark
-from pcii.app.command_options import Depths, Json, Out
+from pcii.app.command_options import Depths, Out
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
@@ -93,7 +93,7 @@ def evaluate(
 
 
 @app.command
-def verify(folder: Path, *, json: Json = False) -> None:
+def verify(folder: Path, *, json: Annotated[bool, Parameter(name="--json")] = False) -> None:
     """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
     Names what is missing, truncated or changed, and what the manifest does not list, and says where other

@@ -49,9 +49,6 @@ def import_dataset(
     seed: int | None = None,
     z_mm: Depths = (),
     z_range_mm: Pair = None,
-    title: str | None = None,
-    licence: str | None = None,
-    citation: str | None = None,
 ) -> None:
     """Make a dataset of images that others made: pictures, arrays, lens arrays, photon counts.
 
@@ -64,11 +61,7 @@ def import_dataset(
         pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
           --sensor-mm 36 --cfa GRBG --photons 1000 --z-range-mm 30 200
         pcii import cotton -o out/cotton
-        pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3 \\
-          --pixel-mm 0.01
         pcii import frames.npy -o out/spad --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
-        pcii import cubes -o out/spad --counts --bitpack --pattern "{row}_{col}.npy" --pitch-mm 5 5 \\
-          --focal-mm 50 --pixel-mm 0.05
 
     Parameters
     ----------
@@ -104,12 +97,6 @@ def import_dataset(
         things are sharpest.
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
-    title
-        Title of reports. Default: the name of the source.
-    licence
-        Licence of the images.
-    citation
-        Whom to cite for the images.
     """
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
@@ -138,9 +125,7 @@ def import_dataset(
             z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
-            title=title or source.resolve().name,
-            licence=licence,
-            citation=citation,
+            title=source.resolve().name,
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
@@ -148,7 +133,7 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    advice = None if imported.states_cameras else _advice(fit, order, lenses, z_range)
+    advice = None if imported.states_cameras else _advice(fit, z_range)
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
@@ -156,32 +141,18 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:
-    """What would make the views fit the cameras, in words of options; None if they do."""
-    sentences: list[str] = []
+def _advice(fit: CameraFit, z_range: Pair) -> str | None:
+    """Which options would make the views fit the cameras; None if they do."""
     if fit.order is not None:
-        changes = {n: value for n, value in values_of(fit.order).items() if value != getattr(order, n)}
-        if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
-            changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
-        flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}
-        words = [
-            f"{word} --{' --'.join(names).replace('_', '-')}"
-            for word, names in (("with", flags[True]), ("without", flags[False]))
-            if names
-        ]
-        sentences.append(f"the views fit together far better {' and '.join(words)}")
+        names = [f"--{name.replace('_', '-')}" for name, value in values_of(fit.order).items() if value]
+        return f"the views fit together far better with {' '.join(names) or 'no option'} for their order"
     if fit.shear_px is not None:
         x, y = fit.shear_px
-        sentences.append(
-            "things are sharp at disparities below 0, as of pictures that were shifted so that something "
-            f"stands still: give that shift as --shear-px; {x:g} {y:g} or more brings all in front"
-        )
+        return f"things are sharp at disparities below 0; add a shift to --shear-px, {x:g} {y:g} or more"
     if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
-        sentences.append(
-            f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm; correct "
-            "--pitch-mm, --focal-mm or the size of pixels, or the range"
-        )
-    return "; ".join(sentences) or None
+        where = f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm"
+        return f"{where}; correct the range, --pitch-mm, --focal-mm or the size of pixels"
+    return None
 
 
 def _say_depths(fit: CameraFit) -> None:
@@ -189,15 +160,11 @@ def _say_depths(fit: CameraFit) -> None:
     if fit.z_mm:
         say(f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm")
     elif fit.nearest_mm is None:
-        say(
-            "cannot judge whether views fit their cameras, of one view, of small views or of few photons; "
-            "name depths to `pcii run` by --z-mm"
-        )
+        say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
     else:
         say(
-            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; if there are "
-            "photons and texture enough, correct the order of views, --pitch-mm, --focal-mm or the size of "
-            "pixels, else name depths to `pcii run` by --z-mm"
+            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; correct the order "
+            "of views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
         )
 
 

@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from pcii.base.extensions import name_of
 from pcii.base.progress import Report, silent
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_depth_method
 from pcii.metrics.scoring import score
@@ -18,7 +17,6 @@ from pcii.types.estimates import DepthMap, Score, Segmented
 from pcii.types.focal_planes import FocalPlanes, check_depth_counts
 from pcii.types.section_stack import Sections
 
-Method = str | Callable[..., Any]
 Result = TypeVar("Result")
 
 
@@ -44,8 +42,8 @@ def analyse(
     dataset: Dataset,
     planes: FocalPlanes,
     z_range_mm: tuple[float, float],
-    methods: Sequence[Method] = (),
-    depth_method: Method = DEFAULT_METHOD,
+    methods: Sequence[str] = (),
+    depth_method: str = DEFAULT_METHOD,
     report: Report = silent,
 ) -> Outcome:
     """Reconstruct sections, remove defocused points by each of `methods`, map depth by `depth_method`, score.
@@ -57,20 +55,17 @@ def analyse(
     counts = dataset.counts if dataset.has_counts or dataset.views is None or methods else None
     data = dataset.views if counts is None else counts
     assert data is not None
-    names = list(dict.fromkeys(methods or DEFAULT_METHODS)) if counts is not None else []
-    removals = {_name(method): find_method(method) for method in names}  # unknown names before any work
+    names = methods or DEFAULT_METHODS if counts is not None else ()
+    removals = {name: find_method(name) for name in names}  # unknown names before any work
     find_depth_method(depth_method, data)
     if counts is not None:
         check_depth_counts(counts)
-    steps = [*(f"removal, {name}" for name in removals), "sections at full light", "depth", "score"]
-    seconds, finished = dict.fromkeys(["sections", *steps] if removals else steps, 0.0), list[str]()
+    seconds: dict[str, float] = {}
 
     def timed(step: str, work: Callable[[], Result]) -> Result:
         start = time.perf_counter()
         result = work()
         seconds[step] = round(time.perf_counter() - start, 3)
-        finished.append(step)
-        report("analysis", len(finished), len(seconds))
         return result
 
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
@@ -84,21 +79,17 @@ def analyse(
             assert counts is not None
             assert sections is not None
             focus.append(timed(f"removal, {name}", partial(remove, counts, sections)))
+            report("removal", len(focus), len(removals))
         full_light, depth_map = light.result(), depth.result()
     sections = full_light if sections is None else sections
     assert sections is not None
     options = {"grid": dataset.grid, "full_light": full_light, "dataset": dataset.name}
     result = timed("score", partial(score, focus, depth_map, dataset.truth, **options))
-    depth_name = _name(depth_method)
     return Outcome(
-        dataset, full_light, sections, tuple(focus), depth_map, result, z_range_mm, seconds, depth_name
+        dataset, full_light, sections, tuple(focus), depth_map, result, z_range_mm, seconds, depth_method
     )
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes) -> Sections | None:
     """Sections of the radiance at the planes (Eq. 2); None if the dataset has none."""
     return None if dataset.views is None else reconstruct(dataset.views, planes)
-
-
-def _name(method: Method) -> str:
-    return method if isinstance(method, str) else name_of(method)

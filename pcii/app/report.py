@@ -11,8 +11,7 @@ from pathlib import Path
 
 from pcii.app.command_options import budget_words
 from pcii.app.pipeline import Outcome
-from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels
-from pcii.app.report_slider import slider
+from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels, slider_panels
 from pcii.app.report_tables import depth_table, entropy_table, key_facts, score_table
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_bytes_safely
@@ -28,18 +27,18 @@ COARSE_PX = 320
 def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
     """Write the report of one run as a self-contained HTML file."""
     dataset, pictures = outcome.dataset, Pictures.of(outcome)
-    truth, crop = dataset.truth, pictures.crop
+    grid = dataset.grid
     content = {
         "title": dataset.manifest.get("title") or dataset.name,
-        "grid": dataset.grid,
+        "grid": grid,
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
-        "has_truth": truth is not None,
+        "has_truth": dataset.truth is not None,
         "facts": key_facts(outcome),
-        "crop": crop,
-        "is_coarse": max(crop.width_px, crop.height_px) < COARSE_PX,
+        "is_coarse": max(grid.shape_HW) < COARSE_PX,
         "smoothing_px": pictures.smoothing_px,
-        "slider": slider(pictures, report),
+        "light": pictures.light,
+        "slider": slider_panels(pictures, report),
         "input": input_panels(pictures),
         "planes": plane_panels(pictures),
         "depth": depth_panels(pictures),

@@ -1,6 +1,6 @@
-"""Pictures of a report: a view, and for each plane its section, masks and truth; depth, error, confidence.
+"""Pictures of a report: a view, sections through the depths, masks and truth of each plane, depth and error.
 
-All show the same part of the frame, the `Crop`, so that a place in one is the same place in all others.
+All show the whole frame, in blocks of `step_px` x `step_px` pixels if it is large.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from pcii.app.pipeline import Outcome
+from pcii.base.compiled_loops import each_in_threads
+from pcii.base.progress import Report
 from pcii.figures.exposure import (
     block_px,
     encoded,
@@ -30,13 +32,21 @@ from pcii.figures.pictures import (
     mask_image,
     photo_uri,
 )
-from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
+from pcii.sections.reconstruction import reconstruct
 from pcii.types.bayer import colours_and_samples
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import total_disparity_px
 from pcii.types.section_stack import Sections
 
 LONGEST_PX = 640
-"""Longer sides of pictures are shown at one of 2 x 2 pixels, or of more."""
+"""Longer sides of pictures are shown in blocks of 2 x 2 pixels, or of more."""
+MAX_SLIDER_PLANES = 20
+"""Pictures of the slider: a report of 1024 x 1024 pixels is then below 8 MB."""
+MIN_SLIDER_STEP_PX = 1.0
+"""Sections whose total disparities differ by less look the same."""
+SECTIONS_AT_ONCE = 4
+"""Sections of the slider in memory at once; each such group reads all views."""
 UNSATURATED_SHARE = 0.95
 """Share of the errors of depth that lie within the scale of their colours."""
 
@@ -46,64 +56,23 @@ Estimate = tuple[np.ndarray, np.ndarray]
 """Means of the blocks of a section and their numbers of samples, (h, w, C) each."""
 
 
-@dataclass(frozen=True)
-class Crop:
-    """Part of the frame that a report shows: `rows` and `cols`, at one of `step_px` x `step_px` pixels."""
-
-    rows: slice
-    cols: slice
-    step_px: int = 1
-
-    @property
-    def height_px(self) -> int:
-        """Height of the part in pixels of the frame."""
-        return self.rows.stop - self.rows.start
-
-    @property
-    def width_px(self) -> int:
-        """Width of the part in pixels of the frame."""
-        return self.cols.stop - self.cols.start
-
-    def middles(self, image: np.ndarray) -> np.ndarray:
-        """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
-        part, step = image[self.rows, self.cols], self.step_px
-        rows, cols = (
-            np.minimum(np.arange(0, size, step) + step // 2, size - 1)
-            for size in (self.height_px, self.width_px)
-        )
-        return part[rows][:, cols]
-
-    def sums(self, image: np.ndarray) -> np.ndarray:
-        """Sums over the blocks of an image (H, W, C)."""
-        return image_block_sums(image[self.rows, self.cols], self.step_px)
-
-
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """What a report shows: results, a part of the frame, and how photons are smoothed.
+    """The results that a report shows, the side of its blocks, and how photons of sections are smoothed.
 
-    `smoothing_px` is the standard deviation in pixels of the Gaussian with which photons of sections are
-    shown, 0 for none.
+    `smoothing_px` is the standard deviation in pixels of the Gaussian, 0 for none.
     """
 
     outcome: Outcome
-    crop: Crop
+    step_px: int
     smoothing_px: float
 
     @classmethod
     def of(cls, outcome: Outcome) -> "Pictures":
-        """The true objects with a margin, or without any what the methods claim, else the whole frame."""
-        truth, smoothing_px = outcome.dataset.truth, 0.0
-        if truth is not None and truth.has_objects:
-            region = truth.object_id > 0
-        else:
-            region = np.zeros(outcome.dataset.grid.shape_HW, dtype=bool)
-            region |= np.any([focus.in_focus.any(axis=0) for focus in outcome.focus], axis=0)
-        box = box_around(region)
-        if outcome.dataset.has_counts:
-            smoothing_px = smoothing_for([counts[box] for counts in outcome.sections.counts])
-        step_px = block_px([side.stop - side.start for side in box], LONGEST_PX)
-        return cls(outcome, Crop(*box, step_px), smoothing_px)
+        """Blocks by the size of the frame, and a Gaussian by the number of photons."""
+        has_counts = outcome.dataset.has_counts
+        smoothing_px = smoothing_for(list(outcome.sections.counts)) if has_counts else 0.0
+        return cls(outcome, block_px(outcome.dataset.grid.shape_HW, LONGEST_PX), smoothing_px)
 
     @cached_property
     def true_masks(self) -> np.ndarray | None:
@@ -111,71 +80,95 @@ class Pictures:
         truth = self.outcome.dataset.truth
         return None if truth is None else TrueFocus(self.outcome.sections.planes, truth).by_object
 
+    @property
+    def light(self) -> str:
+        """What sections show, in words."""
+        if not self.outcome.dataset.has_counts:
+            return "full light (Eq. 2)"
+        smoothing = f", smoothed by {self.smoothing_px:g} px" if self.smoothing_px else ""
+        return f"photon counts (Eq. 3){smoothing}"
 
-def smoothing_words(smoothing_px: float) -> str:
-    """What a caption says of the smoothing of the photons that it is of."""
-    return f", smoothed by {smoothing_px:g} px" if smoothing_px else ""
+    def middles(self, image: np.ndarray) -> np.ndarray:
+        """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
+        rows, cols = (
+            np.minimum(np.arange(0, size, self.step_px) + self.step_px // 2, size - 1)
+            for size in image.shape[:2]
+        )
+        return image[rows][:, cols]
 
 
-def block_estimate(sections: Sections, plane: int, crop: Crop, smoothing_px: float = 0.0) -> Estimate:
-    """Estimate of the blocks of one section: the sums of its counts over its samples.
+def block_estimates(sections: Sections, step_px: int, smoothing_px: float = 0.0) -> list[Estimate]:
+    """Estimates of the blocks of each section: the sums of its counts over its samples.
 
     Both are smoothed by a Gaussian with a standard deviation of `smoothing_px` pixels of the frame. At some
     depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the estimate is
     that of the blocks around.
     """
-    sums, samples = crop.sums(sections.counts[plane]), crop.sums(sections.coverage[plane])
-    if smoothing_px:
-        sums, samples = smoothed(sums, samples, smoothing_px / crop.step_px)
-    return filled_means(sums, samples), samples
+    estimates: list[Estimate] = []
+    for counts, coverage in zip(sections.counts, sections.coverage, strict=True):
+        sums, samples = image_block_sums(counts, step_px), image_block_sums(coverage, step_px)
+        if smoothing_px:
+            sums, samples = smoothed(sums, samples, smoothing_px / step_px)
+        estimates.append((filled_means(sums, samples), samples))
+    return estimates
 
 
-def _section_images(sections: Sections, crop: Crop, smoothing_px: float = 0.0) -> list[np.ndarray]:
-    """Pictures of sections, all at the same exposure."""
-    planes = range(len(sections.z_mm))
-    return encoded([block_estimate(sections, plane, crop, smoothing_px) for plane in planes])
+def slider_planes(outcome: Outcome) -> FocalPlanes:
+    """Planes through the depth range and those of the analysis, evenly spaced in total disparity."""
+    grid, own = outcome.dataset.grid, outcome.sections.z_mm
+    near, far = min(outcome.z_range_mm[0], own.min()), max(outcome.z_range_mm[1], own.max())
+    span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
+    if span_px == 0:  # one camera has one section for all depths
+        return FocalPlanes.at_depths(grid, own[:1])
+    step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
+    planes = FocalPlanes.between(grid, near, far, step_px)
+    return planes.take(slice(None, None, -1))  # from near to far
+
+
+def slider_panels(pictures: Pictures, report: Report) -> list[Panel]:
+    """Sections through the depth range, all at one exposure; captions are depths."""
+    planes, estimates = slider_planes(pictures.outcome), list[Estimate]()
+    for first in range(0, len(planes), SECTIONS_AT_ONCE):
+        group = planes.take(slice(first, first + SECTIONS_AT_ONCE))
+        sections = reconstruct(pictures.outcome.dataset.counts_or_views, group)
+        estimates += block_estimates(sections, pictures.step_px, pictures.smoothing_px)
+        report("pictures of sections", len(estimates), len(planes))
+    images = each_in_threads(photo_uri, encoded(estimates))
+    return [{"image": image, "caption": f"{z:.4g} mm"} for image, z in zip(images, planes.z_mm, strict=True)]
 
 
 def input_panels(pictures: Pictures) -> list[Panel]:
     """The view in the middle: its photons, and at full light."""
-    dataset, crop = pictures.outcome.dataset, pictures.crop
+    dataset, step_px = pictures.outcome.dataset, pictures.step_px
     k, l = dataset.grid.middle_camera
     panels: list[Panel] = []
     if dataset.has_counts:
         view = dataset.counts.view(k, l)
-        image = photon_picture(view[crop.rows, crop.cols], crop.step_px)
-        panels.append(_drawing(image, f"view ({k}, {l}): {view.sum()} photons"))
+        panels.append(_drawing(photon_picture(view, step_px), f"view ({k}, {l}): {view.sum()} photons"))
     if dataset.views is not None:
         light = colours_and_samples(dataset.views.view(k, l), dataset.views.cfa)
-        (image,) = exposed([(light[0][crop.rows, crop.cols], light[1][crop.rows, crop.cols])], crop.step_px)
-        panels.append(_photo(image, f"view ({k}, {l}) at full light"))
+        panels.append(_photo(exposed([light], step_px)[0], f"view ({k}, {l}) at full light"))
     return panels
 
 
 def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
     """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
-    outcome, crop, true = pictures.outcome, pictures.crop, pictures.true_masks
-    words = smoothing_words(pictures.smoothing_px)
-    lights: dict[str, list[np.ndarray]] = {}
-    if outcome.dataset.has_counts:
-        photons = _section_images(outcome.sections, crop, pictures.smoothing_px)
-        lights[f"photon counts (Eq. 3){words}"] = photons
-    if outcome.full_light is not None:
-        lights["full light (Eq. 2)"] = _section_images(outcome.full_light, crop)
+    outcome, middles, true = pictures.outcome, pictures.middles, pictures.true_masks
+    images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px))
+    lights = {pictures.light: images}
+    if outcome.dataset.has_counts and outcome.full_light is not None:
+        lights["full light (Eq. 2)"] = encoded(block_estimates(outcome.full_light, pictures.step_px))
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
-        sections = [
-            _photo(images[plane], f"section at {z:g} mm, {light}") for light, images in lights.items()
-        ]
+        sections = [_photo(light[plane], f"section at {z:g} mm, {words}") for words, light in lights.items()]
         if true is not None:
-            sections.append(_drawing(mask_image(crop.middles(true[plane])), f"truth: objects at {z:g} mm"))
+            sections.append(_drawing(mask_image(middles(true[plane])), f"truth: objects at {z:g} mm"))
         masks: list[Panel] = []
-        first, *_ = lights.values()
         for focus in outcome.focus:
-            claim = crop.middles(focus.in_focus[plane])
-            masks.append(_photo(first[plane] * claim[..., None], f"{focus.method}, {z:g} mm{words}"))
+            claim = middles(focus.in_focus[plane])
+            masks.append(_photo(images[plane] * claim[..., None], f"{focus.method}, {z:g} mm"))
             if true is not None:
-                image = agreement_image(claim, crop.middles(true[plane]))
+                image = agreement_image(claim, middles(true[plane]))
                 masks.append(_drawing(image, f"{focus.method}, {z:g} mm, compared with the truth"))
         planes.append((f"{z:g} mm", sections, masks))
     return planes
@@ -183,12 +176,12 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
 
 def depth_panels(pictures: Pictures) -> list[Panel]:
     """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
-    truth, depth, crop = pictures.outcome.dataset.truth, pictures.outcome.depth, pictures.crop
-    z_mm, confidence = crop.middles(depth.z_mm), crop.middles(depth.confidence)
+    truth, depth = pictures.outcome.dataset.truth, pictures.outcome.depth
+    z_mm, confidence = pictures.middles(depth.z_mm), pictures.middles(depth.confidence)
     scale = DEPTH_COLOURS, pictures.outcome.z_range_mm, "mm"
     panels = [_map("estimated depth, paler where less sure", z_mm, *scale, confidence)]
     if truth is not None:
-        true_mm = crop.middles(truth.object_z_mm)
+        true_mm = pictures.middles(truth.object_z_mm)
         words = "true depth of the objects" if truth.has_objects else "true depth"
         panels.append(_map(words, true_mm, *scale))
         error, limit = depth_errors(z_mm, true_mm)

@@ -8,7 +8,7 @@ depth.zarr/              z_mm, confidence
 score.json               as in `Score.to_dict`
 *.png, report.html       pictures and the report
 
-New results are written completely into a folder beside, and renamed.
+New results are written completely into a folder beside, which takes the place of the earlier one.
 """
 
 import shutil
@@ -20,17 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from pcii.app.pipeline import Method, Outcome, analyse
+from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import (
     locked,
     named_in_errors,
-    replace_folder,
-    sweep_temporaries,
-    temporaries_of,
-    temporary_folder,
+    new_folder_safely,
     write_json_safely,
 )
 from pcii.depth.methods import DEFAULT_METHOD
@@ -40,16 +37,17 @@ from pcii.store.folders import (
     RESULTS,
     RESULTS_FOLDER,
     Files,
+    entries,
     hash_json,
     list_files,
     lists_part,
     read_results,
     unlisted_files,
 )
-from pcii.store.software import differences, own_software
+from pcii.store.software import own_software
 from pcii.store.zarr_groups import read_array, write_arrays_safely
 from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS
-from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.section_stack import Sections
 
@@ -61,8 +59,8 @@ def run(
     out: Path,
     planes: FocalPlanes,
     z_range_mm: tuple[float, float],
-    methods: Sequence[Method] = (),
-    depth_method: Method = DEFAULT_METHOD,
+    methods: Sequence[str] = (),
+    depth_method: str = DEFAULT_METHOD,
     report: Report = silent,
 ) -> Outcome:
     """Analyse `dataset`, and write all results with a report into `out`, in the place of earlier ones.
@@ -75,14 +73,14 @@ def run(
         for focus in outcome.focus:
             save_segmented(folder, focus)
         save_depth(folder, outcome.depth)
-        save_score(folder, outcome.score)
+        write_json_safely(folder / SCORE, outcome.score.to_dict())
         write_report(folder / REPORT, outcome, report)
     return outcome
 
 
 @contextmanager
 def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Path]:
-    """An empty folder to write results into, which are moved into `out` when the block ends without an error.
+    """An empty folder to write results into, which are moved to `out` when the block ends without an error.
 
     They replace earlier results of the same names or, if they are `whole`, all earlier ones. Raises
     `InputError` if another command is writing there, for the dataset itself, and for a folder that has
@@ -91,33 +89,22 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
     target = out.resolve()
     if target == dataset.path.resolve():
         raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-    lock = target.with_name(f".{target.name}.lock")
-    with _only_writer(lock, out), named_in_errors(out):
-        for left in temporaries_of(target.parent, target.name):  # by a command that was killed
-            shutil.rmtree(left, ignore_errors=True)
-        files_before, versions_before = _results_of(out, dataset)
-        whole = whole or not files_before
-        if whole and (extra := unlisted_files(target, [RESULTS, *files_before])):
+    with _only_writer(target, out), named_in_errors(out):
+        files, versions = _results_of(out, dataset)
+        if files and (extra := unlisted_files(target, [RESULTS, *files])):
             raise InputError(f"{out}: holds {extra[0]}, which is no result; move it away")
-        with temporary_folder(target) as folder:
+        with new_folder_safely(target) as folder:
             yield folder
-            files = list_files(folder, sorted(entry.name for entry in folder.iterdir()))
-            content = _origin(dataset) | {"versions": own_software(), "files": files}
-            if whole:
-                RESULTS_FOLDER.write(folder, content)
-                replace_folder(folder, target)
-                return
-            sweep_temporaries(target)
-            parts = sorted({name.split("/")[0] for name in files})
-            for part in parts:
-                if (folder / part).is_dir():
-                    replace_folder(folder / part, target / part)
-                else:
-                    (folder / part).replace(target / part)
-            remaining = {n: entry for n, entry in files_before.items() if n.split("/")[0] not in parts}
-            content["files"] = dict(sorted((remaining | files).items()))
-            content["versions"] = _all_versions(versions_before, own_software())
-            RESULTS_FOLDER.write(target, content)
+            new_parts = sorted(entry.name for entry in folder.iterdir())
+            files = {n: entry for n, entry in files.items() if not whole and n.split("/")[0] not in new_parts}
+            for name in files:
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(target / name, folder / name)
+            content = _origin(dataset) | {
+                "versions": _all_versions({} if whole else versions, own_software()),
+                "files": dict(sorted((files | list_files(folder, new_parts)).items())),
+            }
+            RESULTS_FOLDER.write(folder, content)
 
 
 @contextmanager
@@ -138,9 +125,7 @@ def _origin(dataset: Dataset) -> dict[str, Any]:
 
 def _results_of(out: Path, dataset: Dataset) -> tuple[Files, Mapping[str, str]]:
     """The files of the results in `out`, and the versions that made them; `InputError` if of other data."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the results")
-    if not out.exists() or not any(out.iterdir()):
+    if not entries(out, "results"):
         return {}, {}
     if not (out / RESULTS).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
@@ -183,11 +168,6 @@ def save_depth(folder: Path, depth: DepthMap) -> None:
     write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS)
 
 
-def save_score(folder: Path, result: Score) -> None:
-    """Write score.json."""
-    write_json_safely(folder / SCORE, result.to_dict())
-
-
 def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthMap | None]:
     """The masks of every method in a folder of results, and the depth map or None.
 
@@ -215,8 +195,3 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
         steps = "`pcii segment`, `pcii depth` or `pcii run`"
         raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with {steps}")
     return segmented, depth
-
-
-def other_software(out: Path) -> str:
-    """How the software that made the results in a folder differs from that of now; empty if it does not."""
-    return differences(read_results(out).versions, own_software())

@@ -1,38 +1,37 @@
 """Commands that analyse one dataset: all steps, sections, depth, removal, score."""
 
 from pathlib import Path
-from typing import Literal
-
-import numpy as np
 
 from pcii.app import results
 from pcii.app.command_options import (
     Budget,
     DatasetFolder,
     DepthRange,
-    Json,
     ResultsOut,
     SectionDepths,
     budget_words,
     dataset_at,
 )
 from pcii.app.pipeline import full_light_sections
-from pcii.base.command_line import answer_json, say, say_next, say_next_page
+from pcii.app.report_pictures import block_estimates
+from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.progress import Stages
+from pcii.base.safe_files import write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
-from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
+from pcii.figures.exposure import encoded
+from pcii.figures.pictures import depth_image, mask_image, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
-from pcii.sections import reconstruction
-from pcii.sections.demosaicing import demosaic
+from pcii.sections.reconstruction import reconstruct as reconstruct_sections
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
+from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes
 
-LOW_DEPTH_SHARE = 0.05
-"""A depth map that answers for a smaller share of the pixels is warned of."""
+LOW_ANSWERED_SHARE = 0.1
+"""A depth map that answers for a smaller share of the photons is warned of."""
 
 
 def run(
@@ -72,7 +71,7 @@ def run(
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
-    _warn_of_few_depths(outcome.depth, data)
+    _warn_of_few_depths(outcome.depth, data, z_range_mm)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
 
@@ -83,7 +82,6 @@ def reconstruct(
     out: ResultsOut,
     z_mm: SectionDepths = (),
     subpixel: int = 1,
-    shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
 ) -> None:
     """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
@@ -97,19 +95,13 @@ def reconstruct(
     ----------
     subpixel
         Divide each pixel into this many voxels per axis.
-    shifts
-        `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
-        sections = reconstruction.reconstruct(data.counts_or_views, planes, subpixel=subpixel, shifts=shifts)
+        sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
         results.save_sections(folder, sections)
-        for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
-            estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
-            if sections.cfa is not None:
-                estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
-            picture = to_srgb8(estimate, white_level(estimate))
+        for z, picture in zip(sections.z_mm, encoded(block_estimates(sections, 1)), strict=True):
             write_png(folder / f"section_{z:g}mm.png", picture)
     say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
     saturated = int(np.count_nonzero(np.isinf(sections.estimate)))
@@ -149,7 +141,7 @@ def depth(
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
     say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, paler where less sure")
-    _warn_of_few_depths(depth_map, data)
+    _warn_of_few_depths(depth_map, data, (near, far))
     _say_next_score(data, out)
 
 
@@ -180,33 +172,29 @@ def segment(
     with results.writing(out, data) as folder:
         focus = removal.segment(data.counts, planes, method=method)
         results.save_segmented(folder, focus)
-        names = [f"in_focus_{focus.method}_{z:g}mm.png" for z in focus.z_mm]
-        for name, mask in zip(names, focus.in_focus, strict=True):
-            write_png(folder / name, mask_image(mask))
-    for name, mask in zip(names, focus.in_focus, strict=True):
-        say(f"{out / name}: {mask.mean():.2%} of the section in focus")
+        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+            write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
+    for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+        say(f"{z:g} mm: {mask.mean():.2%} of the section in focus")
     _say_next_score(data, out)
 
 
-def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
+def score(dataset: DatasetFolder, out: Path) -> None:
     """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
     Examples of use:
 
         pcii score out/paper out/paper-results
-        pcii score out/paper out/depth --json
 
     Parameters
     ----------
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
-    json
-        Print the score too, as score.json has it.
     """
-    data, light = open_dataset(dataset), read_results(out)["light"]
-    data = data if light is None else data.at_budget(light)
+    data, manifest = open_dataset(dataset), read_results(out)
+    data = data if manifest.light is None else data.at_budget(manifest.light)
     focus, depth_map = results.load_estimates(out, data)
-    if difference := results.other_software(out):
+    if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")
     z_mm = data.analysis.get("z_mm")
     planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
@@ -215,10 +203,7 @@ def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
         result = scoring.score(
             focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
         )
-        results.save_score(folder, result)
-    if json:
-        answer_json(result.to_dict())
-        return
+        write_json_safely(folder / results.SCORE, result.to_dict())
     say(f"{out / results.SCORE}")
     if data.truth is None:
         say("the dataset has no truth: what is compared with it is null")
@@ -226,10 +211,13 @@ def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
 
 
-def _warn_of_few_depths(depth_map: DepthMap, data: Dataset) -> None:
-    """Say how little of a depth map has an answer, and what is the most likely reason."""
-    share, grid = float(np.isfinite(depth_map.z_mm).mean()), data.grid
-    if share >= LOW_DEPTH_SHARE:
+def _warn_of_few_depths(depth_map: DepthMap, data: Dataset, z_range_mm: tuple[float, float]) -> None:
+    """Say if a depth map answers for little of the photons, or of the pixels of radiance, and why."""
+    grid, weight = data.grid, np.ones_like(depth_map.z_mm)
+    if data.has_counts:  # in the dark there is nothing to answer for
+        weight = reconstruct_sections(data.counts, float(np.mean(z_range_mm))).counts[0].sum(axis=-1)
+    share = float(weight[np.isfinite(depth_map.z_mm)].sum() / max(weight.sum(), 1))
+    if share >= LOW_ANSWERED_SHARE:
         return
     if min(grid.rows, grid.cols) == 1:
         reason = f"the {grid.rows} x {grid.cols} cameras stand in a line, and see depth at few edges"
@@ -237,7 +225,8 @@ def _warn_of_few_depths(depth_map: DepthMap, data: Dataset) -> None:
         reason = f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
     else:
         reason = "the views show too little texture"
-    say(f"warning: {share:.1%} of the pixels have a depth, most likely since {reason}")
+    what = "photons" if data.has_counts else "pixels"
+    say(f"warning: {share:.1%} of the {what} have a depth, most likely since {reason}")
 
 
 def _say_next_score(data: Dataset, out: Path) -> None:
