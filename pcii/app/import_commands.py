@@ -163,8 +163,9 @@ def _say_depths(fit: CameraFit) -> None:
         say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
     else:
         say(
-            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; correct the order "
-            "of views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
+            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; correct the "
+            "order of views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by "
+            "--z-mm"
         )
 
 

@@ -108,9 +108,12 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
 
 
 @contextmanager
-def _only_writer(lock: Path, out: Path) -> Iterator[None]:
+def _only_writer(target: Path, out: Path) -> Iterator[None]:
+    lock = target.with_name(f".{target.name}.lock")
     with locked(lock, out):
         try:
+            for left in temporaries_of(target.parent, target.name):  # by a command that was killed
+                shutil.rmtree(left, ignore_errors=True)
             yield
         finally:
             lock.unlink(missing_ok=True)

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from pcii.app import results
 from pcii.app.command_options import (
     Budget,

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
@@ -24,8 +22,14 @@ from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
 from pcii.evaluation.submissions import SUBMISSION, read_maps, read_submission, tasks_of_submission
 from pcii.evaluation.tasks import Task, lights_of, tasks_of
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.benchmark_layout import Definition
-from pcii.store.collection import Collection, Half, open_collection, read_collection
+from pcii.store.collection import (
+    BENCHMARK_FIELDS,
+    Collection,
+    Half,
+    is_collection,
+    open_collection,
+    read_collection,
+)
 from pcii.store.dataset import FULL_LIGHT, Dataset, budget_of
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented
@@ -46,10 +50,8 @@ class BenchmarkHalf:
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
-    try:
-        definition = Definition.model_validate(read_collection(path).recipe)
-    except (InputError, ValidationError):
-        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`") from None
+    if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
+        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     collection = open_collection(path)
     chosen: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
     if not len(chosen):
@@ -59,7 +61,7 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     lights = {row["path"]: row["values"]["light"] for row in chosen.rows}
     lit = {scenes[each.name]: each for each in datasets if lights[each.name] == FULL_LIGHT}
     full_light = {name: lit[scene] for name, scene in scenes.items() if scene in lit}
-    return BenchmarkHalf(definition.name, half, datasets, full_light)
+    return BenchmarkHalf(read_collection(path).recipe["name"], half, datasets, full_light)
 
 
 class BenchmarkJob(EvaluationJob):
