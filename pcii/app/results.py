@@ -28,6 +28,7 @@ from pcii.base.safe_files import (
     locked,
     named_in_errors,
     new_folder_safely,
+    temporaries_of,
     write_json_safely,
 )
 from pcii.depth.methods import DEFAULT_METHOD
