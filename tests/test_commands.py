@@ -51,6 +51,8 @@ def test_score_json_is_as_in_the_contract(results: Path) -> None:
     assert list(score["depth"]) == [
         *contract,
         "median_px",
+        "mae_px",
+        "bias_mm",
         "bias_px",
         "hci",
         "hci_objects",

@@ -37,8 +37,8 @@ OUTLIER_SHARE = 0.01
 """Share of the depths, at either end, that may lie outside the scale."""
 MIN_DEPTH_SPAN_MM = 1.0
 """A scale of depth spans so much at least: what is flat is no picture of rounding errors."""
-OBJECT_COLOURS = "tab20"
-"""Colour map of Matplotlib for objects; further objects have the same colours again."""
+OBJECT_COLOURS, OBJECT_COLOUR_COUNT = "tab20", 20
+"""Colour map of Matplotlib for objects, and its colours, which further objects have again."""
 MAX_NAMES = 40
 """Objects that are named beside a picture: the largest."""
 NAME_LINES = 16
@@ -174,7 +174,7 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
     from matplotlib.patches import Patch
 
     ids, sizes = np.unique(truth.object_id[truth.object_id > 0], return_counts=True)
-    colours = np.resize(colormaps[OBJECT_COLOURS].colors, (ids.size, 3))
+    colours = colormaps[OBJECT_COLOURS](np.arange(ids.size) % OBJECT_COLOUR_COUNT)[:, :3]
     image = np.full((*truth.object_id.shape, 3), NO_ANSWER, np.uint8)
     for number, colour in zip(ids, colours, strict=True):
         image[truth.object_id == number] = np.round(255 * colour)
@@ -184,7 +184,7 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
         write_in_middle(axes, "no object is seen")
         return
     largest = np.sort(np.argsort(-sizes, kind="stable")[:MAX_NAMES])
-    patches = [Patch(color=colours[n], label=plot_label(truth.names[int(ids[n])])) for n in largest]
+    patches = [Patch(color=tuple(colours[n]), label=plot_label(truth.names[int(ids[n])])) for n in largest]
     place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "ncols": -(-len(patches) // NAME_LINES)}
     axes.legend(handles=patches, frameon=False, fontsize="small", **place)
 

@@ -15,7 +15,8 @@ from pcii.types.estimates import DepthMap
 from pcii.types.geometry import parallax_px, total_disparity_px
 from pcii.types.truth import Truth
 
-MEASURES = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "bias_px")
+MEASURES = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px", "bias_mm")
+MEASURES += ("bias_px",)
 HCI_BORDER_PX = 15
 """Border that the benchmark ignores."""
 HCI_BAD_PX = 0.07
@@ -33,10 +34,10 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     The objects' pixels are those with a `Truth.object_z_mm`: all with a true depth, if no object is known.
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
     since a dark backdrop has no photons to estimate depth from.
-    `mae_mm` and `median_mm` are mean and median absolute errors of the pixels with an estimate, `median_px`
-    the median in px of total disparity, `bias_px` that of the signed error, above 0 where depths are too far;
-    `bad_1px` and `bad_3px` the shares with larger errors; `coverage` that with an estimate. All are None
-    without a depth map, and where no true depth is known.
+    `mae_mm`, `median_mm`, `mae_px` and `median_px` are mean and median absolute errors of the pixels with an
+    estimate, in mm and in px of total disparity; `bias_mm` and `bias_px` the medians of their signed errors,
+    above 0 where depths are too far; `bad_1px` and `bad_3px` the shares with larger errors; `coverage` that
+    with an estimate. All are None without a depth map, and where no true depth is known.
     """
     errors: dict[str, Any] = dict.fromkeys(MEASURES)
     errors["hci"], errors["hci_objects"] = dict.fromkeys(HCI_MEASURES), dict.fromkeys(HCI_MEASURES)
@@ -51,7 +52,7 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
         return errors
     estimate, true = depth.z_mm[on_object], truth.z_mm[on_object]
     answered = _answered(estimate)
-    error_mm = np.abs(estimate[answered] - true[answered])
+    signed_mm = estimate[answered] - true[answered]
     estimated_px, true_px = (total_disparity_px(grid, z_mm[answered]) for z_mm in (estimate, true))
     signed_px = true_px - estimated_px  # what is farther has less disparity
     error_px = np.full(estimate.shape, np.inf)
@@ -59,9 +60,10 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     errors["bad_1px"], errors["bad_3px"] = (float((error_px > limit).mean()) for limit in (1, 3))
     errors["coverage"] = float(answered.mean())
     if answered.any():
-        errors["mae_mm"], errors["median_mm"] = float(error_mm.mean()), float(np.median(error_mm))
-        errors["median_px"] = float(np.median(np.abs(signed_px)))
-        errors["bias_px"] = float(np.median(signed_px))
+        for unit, signed in (("mm", signed_mm), ("px", signed_px)):
+            errors[f"mae_{unit}"] = float(np.abs(signed).mean())
+            errors[f"median_{unit}"] = float(np.median(np.abs(signed)))
+            errors[f"bias_{unit}"] = float(np.median(signed))
     return errors
 
 
