@@ -128,8 +128,8 @@ def _end_with_starter() -> None:
 
 def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generator[tuple[int, Any]]:
     try:
-        import cloudpickle
         from distributed import CancelledError, Client, KilledWorker, as_completed
+        from distributed.protocol.pickle import dumps  # functions of notebooks too
     except ImportError:
         install = "pip install '.[cluster]'"
         raise InputError(f"scheduler: Dask is not installed; type in the source tree: {install}") from None
@@ -145,7 +145,7 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
             if not client.scheduler_info()["workers"]:
                 warnings.warn(f"{address} has no worker yet: dask worker {address}", stacklevel=2)
             # An equal job of an earlier run is another one: pickle does not read the bytes at the end.
-            pickled = cloudpickle.dumps(work) + os.urandom(16)
+            pickled = dumps(work) + os.urandom(16)
             futures = client.map(_do_elsewhere, pieces, pickled=pickled, pure=False)
             by_future = dict(zip(futures, pieces, strict=True))
             del futures
