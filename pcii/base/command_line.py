@@ -7,11 +7,13 @@ With PCII_TRACEBACK=1 in the environment tracebacks are shown.
 import json
 import os
 import shlex
+import signal
 import sys
 import warnings
 from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError, WorkerLostError
@@ -105,22 +107,34 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
     interrupted run when they are repeated; the message after Ctrl-C says so.
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
+    stops: list[int] = []  # a KeyboardInterrupt that is raised within Dr.Jit becomes another exception
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stops.append(number)
+        raise KeyboardInterrupt
+
+    is_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if is_default:  # else the calling program handles it
+        signal.signal(signal.SIGINT, stop)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *place: complain(f"warning: {message}")
         try:
             code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-        except KeyboardInterrupt:
-            goes_on = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
-            complain(f"stopped{goes_on}")
-            return 130
-        except BrokenPipeError:  # the reader closed the pipe, as `| head` does
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 141
-        except Exception as fault:
+        except (Exception, KeyboardInterrupt) as fault:
             if os.environ.get("PCII_TRACEBACK"):
                 raise
+            if stops or isinstance(fault, KeyboardInterrupt):
+                goes_on = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
+                complain(f"stopped{goes_on}")
+                return 130
+            if isinstance(fault, BrokenPipeError):  # the reader closed the pipe, as `| head` does
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                return 141
             code, sentence = _failure(fault, app, tokens)
             complain(f"error: {sentence}")
+        finally:
+            if is_default:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
         return code if isinstance(code, int) else 0
 
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 import numba as nb
 
@@ -21,7 +21,6 @@ compiled = nb.njit(nogil=True, cache=True)
 helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # type: ignore
 """Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
 
-Arguments = ParamSpec("Arguments")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -63,20 +62,17 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
 
 def shared(
     count: Callable[..., int],
-) -> Callable[[Callable[Concatenate[int, int, Arguments], Result]], Callable[Arguments, list[Result]]]:
+) -> Callable[[Callable[..., Result]], Callable[..., list[Result]]]:
     """Decorator of a loop `loop(first, last, *arguments)`: compiled, called as `loop(*arguments)`.
 
     Threads share the indices from 0 to `count(*arguments)` - 1, as `in_threads` tells.
     """
 
-    def decorate(
-        loop: Callable[Concatenate[int, int, Arguments], Result],
-    ) -> Callable[Arguments, list[Result]]:
+    def decorate(loop: Callable[..., Result]) -> Callable[..., list[Result]]:
         inner = compiled(loop)
 
         @wraps(loop)
-        def run(*arguments: Arguments.args, **named: Arguments.kwargs) -> list[Result]:
-            assert not named, "arguments of loops have places, not names"
+        def run(*arguments: Any) -> list[Result]:
             return in_threads(inner, count(*arguments), *arguments)
 
         return run

@@ -2,13 +2,14 @@
 
 import logging
 import os
+import pickle
 import signal
 import threading
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
-from uuid import uuid4
 
 from pcii.base.errors import InputError, WorkerLostError
 
@@ -59,6 +60,21 @@ def threads_of_worker() -> int | None:
     return _threads_of_worker
 
 
+_one_at_a_time = threading.Lock()
+"""Held while a piece is done: threads of a Dask worker would share one renderer."""
+
+
+@lru_cache(maxsize=1)
+def _copy_of_work(pickled: bytes) -> Work:
+    return pickle.loads(pickled)
+
+
+def _do_elsewhere(piece: int, pickled: bytes) -> Any:
+    """Do a piece in another process, whose copy of the work is kept for the next piece."""
+    with _one_at_a_time:
+        return _copy_of_work(pickled)(piece)
+
+
 # Local worker processes
 
 
@@ -67,15 +83,15 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
     from concurrent.futures import as_completed
     from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 
-    threads = max(1, (os.cpu_count() or 1) // count)
+    pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
     # Not forked: what other threads hold locked would be locked for ever in the copy.
     spawning = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, spawning, _begin_worker, (work, threads))
+    pool = ProcessPoolExecutor(count, spawning, _begin_worker, (threads,))
     try:
         # Workers inherit the mask: Ctrl-C reaches all processes, and this one ends the others.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
-            futures = {pool.submit(_do_in_worker, piece): piece for piece in pieces}
+            futures = {pool.submit(_do_elsewhere, piece, pickled): piece for piece in pieces}
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for future in as_completed(futures):
@@ -89,19 +105,12 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
 
 
 _threads_of_worker: int | None = None
-_work: Work | None = None
-"""In a worker: its copy of the work."""
 
 
-def _begin_worker(work: Work, threads: int) -> None:
-    global _work, _threads_of_worker
-    _work, _threads_of_worker = work, threads
+def _begin_worker(threads: int) -> None:
+    global _threads_of_worker
+    _threads_of_worker = threads
     threading.Thread(target=_end_with_starter, daemon=True).start()
-
-
-def _do_in_worker(piece: int) -> Any:
-    assert _work is not None
-    return _work(piece)
 
 
 def _end_with_starter() -> None:
@@ -117,28 +126,13 @@ def _end_with_starter() -> None:
 # Dask clusters
 
 
-_one_at_a_time = threading.Lock()
-"""Held while a piece is done: threads of a Dask worker would share one renderer."""
-
-
-def _do_on_cluster(piece: int, name: str) -> Any:
-    from distributed import get_worker
-
-    plugin: Any = get_worker().plugins[name]
-    with _one_at_a_time:
-        return plugin.work(piece)
-
-
 def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generator[tuple[int, Any]]:
     try:
-        from distributed import CancelledError, Client, KilledWorker, WorkerPlugin, as_completed
+        from distributed import CancelledError, Client, KilledWorker, as_completed
+        from distributed.protocol.pickle import dumps  # functions of notebooks too
     except ImportError:
         install = "pip install '.[cluster]'"
         raise InputError(f"scheduler: Dask is not installed; type in the source tree: {install}") from None
-
-    class CopyOfWork(WorkerPlugin):  # which workers that start later are given too
-        def __init__(self) -> None:
-            self.work = work
 
     for part in ("client", "batched"):  # which print tracebacks when a connection is lost
         logging.getLogger(f"distributed.{part}").setLevel(logging.CRITICAL)
@@ -146,13 +140,13 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
         client: Any = Client(address, timeout=CONNECTION_TIMEOUT_S)
     except (OSError, ValueError) as fault:
         raise InputError(f"scheduler: none answers at {address} ({fault})") from None
-    name = uuid4().hex
     with client:
         try:
             if not client.scheduler_info()["workers"]:
                 warnings.warn(f"{address} has no worker yet: dask worker {address}", stacklevel=2)
-            client.register_plugin(CopyOfWork(), name=name)
-            futures = client.map(_do_on_cluster, pieces, name=name, pure=False)
+            # An equal job of an earlier run is another one: pickle does not read the bytes at the end.
+            pickled = dumps(work) + os.urandom(16)
+            futures = client.map(_do_elsewhere, pieces, pickled=pickled, pure=False)
             by_future = dict(zip(futures, pieces, strict=True))
             del futures
             for future in as_completed(list(by_future)):
@@ -163,6 +157,3 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
                 lost = f"{address}: the Dask scheduler has ended or is out of reach, or its workers died"
                 raise WorkerLostError(f"{lost}; {GOES_ON}") from fault
             raise
-        finally:
-            if client.status == "running":
-                client.unregister_worker_plugin(name)

@@ -37,8 +37,7 @@ class Numbers:
 
     def begun(self) -> list[tuple[int, int]]:
         """Pieces and the processes that began them, in order."""
-        if not (self.folder / "begun").exists():
-            return []
+        (self.folder / "begun").touch()
         lines = (self.folder / "begun").read_text().split("\n")[:-1]
         return [(int(piece), int(process)) for piece, process in (line.split() for line in lines)]
 
