@@ -1,6 +1,7 @@
 """Progress of long work: bars on a terminal, plain lines in a log."""
 
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -21,12 +22,13 @@ def silent(stage: str, done: int, total: int) -> None:
 
 
 class Stages(AbstractContextManager["Stages"]):
-    """Progress of named stages: bars with time left on a terminal, else a line every ten seconds.
+    """Progress of named stages: bars on a terminal, else a line every ten seconds, with the time left.
 
     Call it as stages(name, done, total); a stage ends when done reaches total.
     """
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()  # steps of one analysis report from two threads
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._begun: dict[str, float] = {}
@@ -54,13 +56,19 @@ class Stages(AbstractContextManager["Stages"]):
             self._bars.stop()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        stage, now = visible(stage), time.monotonic()
+        with self._lock:
+            self._show(visible(stage), done, total)
+
+    def _show(self, stage: str, done: int, total: int) -> None:
         if self._bars is not None:
             if stage not in self._tasks:
                 self._tasks[stage] = self._bars.add_task(stage, total=total)
             self._bars.update(self._tasks[stage], completed=done, total=total)
             return
+        now = time.monotonic()
         begun = self._begun.setdefault(stage, now)
         if done == total or now - self._logged.get(stage, begun) >= LOG_EVERY_S:
             self._logged[stage] = now
-            print(f"{stage}: {done}/{total}, {now - begun:.1f} s", file=sys.stderr, flush=True)
+            left_s = (total - done) * (now - begun) / max(done, 1)
+            left = f", {left_s:.0f} s left" if 0 < done < total else ""
+            print(f"{stage}: {done}/{total}, {now - begun:.1f} s{left}", file=sys.stderr, flush=True)

@@ -27,11 +27,7 @@ SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", 
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage"}
 SHARES |= {"badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 SHARES |= {"ece", "share", "confidence", "correct"}
-<<<<<<< HEAD
 SIGNED = {"bias_mm", "bias_px"}
-=======
-SIGNED = {"bias_mm", "bias_px", "entropy_gap_bits"}
->>>>>>> a2b235030dfcc7c9903c42a3bea8ebe00ad246a2
 SIGNS = {"iou": 1, "bad_1px": -1}
 """What methods of removal and of depth are compared by, and the sign that makes more better."""
 

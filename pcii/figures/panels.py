@@ -1,6 +1,7 @@
-"""Axes to draw in, pictures over the pixels of a view, and colour bars."""
+"""Axes to draw in, pictures over the pixels of a view, colour bars, and scale bars for print."""
 
 import io
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -32,6 +33,8 @@ LABELS_IN = 0.9
 DOTS_PER_INCH = 110
 MAX_NAME_LENGTH = 40
 """Characters of a name, about a third of a plot's width."""
+SCALE_BAR_SHARE = 0.3
+"""A scale bar is at most so long, as a share of the picture's width."""
 
 
 def plot_label(name: str) -> str:
@@ -127,6 +130,22 @@ def colour_scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
     from matplotlib.colors import Normalize
 
     return ScalarMappable(Normalize(*limits), colours)
+
+
+def draw_scale_bar(axes: "Axes", mm_per_px: float | None) -> None:
+    """In place of axes in pixels a bar of a round length, in mm, or px where a pixel's size is unknown."""
+    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+    hide_frame(axes)
+    left, right = axes.get_xlim()
+    px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
+    longest = SCALE_BAR_SHARE * (right - left) / px
+    decade = 10.0 ** math.floor(math.log10(longest))
+    length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
+    place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}
+    looks = {"color": "black", "frameon": False, "pad": 0.0, "borderpad": 0.0, "sep": 3}
+    looks |= {"size_vertical": 0.01 * (right - left), "fill_bar": True}
+    axes.add_artist(AnchoredSizeBar(axes.transData, length * px, f"{length:g} {unit}", **place, **looks))
 
 
 def hide_frame(axes: "Axes") -> None:

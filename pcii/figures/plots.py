@@ -20,6 +20,7 @@ from pcii.figures.panels import (
     MAX_PANELS,
     colour_scale,
     draw_outline,
+    draw_scale_bar,
     hide_frame,
     plot_label,
     several_axes,
@@ -45,9 +46,31 @@ NAME_LINES = 16
 """Names in a column."""
 
 
-def draw(value: Any, axes: Any = None, **options: Any) -> np.ndarray:
-    """Draw a value into Matplotlib axes, by default new ones, and return them (N,)."""
-    return DRAWINGS[type(value).__name__](value, axes, **options)
+def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any) -> np.ndarray:
+    """Draw a value into Matplotlib axes, by default new ones, and return them (N,).
+
+    The style "paper", for print, has a white background and a scale bar instead of axes in pixels: in mm at
+    the depth of a section, else in px. Raises `InputError` for another style than that and "screen".
+    """
+    from matplotlib.style import context
+
+    if style not in ("screen", "paper"):
+        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
+    with context("default" if style == "paper" else {}):
+        panels = DRAWINGS[type(value).__name__](value, axes, **options)
+        if style == "paper":
+            for panel, mm_per_px in zip(panels, _pixel_sizes_mm(value, len(panels)), strict=True):
+                draw_scale_bar(panel, mm_per_px)
+    return panels
+
+
+def _pixel_sizes_mm(value: Any, count: int) -> list[float] | list[None]:
+    """How wide a pixel is at the depth of each of the sections that are drawn; None for other pictures."""
+    sections = getattr(value, "sections", value)
+    if not hasattr(sections, "planes"):
+        return [None] * count
+    z_mm, grid = sections.z_mm, sections.grid
+    return [float(z_mm[plane]) * grid.pixel_mm / grid.focal_mm for plane in evenly_chosen(len(z_mm), count)]
 
 
 def picture_html(value: Any) -> str:
@@ -174,7 +197,7 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
     from matplotlib.patches import Patch
 
     ids, sizes = np.unique(truth.object_id[truth.object_id > 0], return_counts=True)
-    colours = colormaps[OBJECT_COLOURS](np.arange(ids.size) % OBJECT_COLOUR_COUNT)[:, :3]
+    colours = np.asarray(colormaps[OBJECT_COLOURS](np.arange(ids.size) % OBJECT_COLOUR_COUNT))[:, :3]
     image = np.full((*truth.object_id.shape, 3), NO_ANSWER, np.uint8)
     for number, colour in zip(ids, colours, strict=True):
         image[truth.object_id == number] = np.round(255 * colour)

@@ -38,7 +38,10 @@ class Drawn(ShortForm):
         | `DepthMap` | depth, grey without an answer | `z_range_mm`: (near, far) of the scale |
         | `Truth` | depth, and the objects | `z_range_mm` |
 
-        All sections have the same exposure: the 98th percentile of what is lit is white.
+        All sections have the same exposure: the 98th percentile of what is lit is white. For print,
+        `style="paper"` has a white background and a scale bar in place of axes, in mm at the depth of a
+        section: `sections.plot(style="paper")[0].figure.savefig("sections.pdf")`, or .svg.
+
         Raises `InputError` for what are no axes, another number of them, and no camera of the grid.
         """
         from pcii.figures.plots import draw

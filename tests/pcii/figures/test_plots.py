@@ -199,6 +199,27 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     assert panel.collections[0].get_offsets().tolist() == [[0.9, 0.8]]  # type: ignore[union-attr]
 
 
+def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_and_svg() -> None:
+    grid = unit_grid(3, 3, 12, 100)  # at 1 mm a pixel is 1 mm wide
+    sections = pcii.reconstruct(pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid), [1.0, 10.0])
+    focus = pcii.Segmented(np.zeros((2, 12, 100), bool), "by hand", sections)
+    depth = pcii.DepthMap(np.full((12, 100), 9.0), np.ones((12, 100)))
+    with style.context("dark_background"):
+        panels = [*sections.plot(style="paper"), *focus.plot(style="paper"), *depth.plot(style="paper")]
+    labels = []
+    for axes in panels:
+        (bar,) = (each for each in axes.artists if isinstance(each, AnchoredSizeBar))
+        labels.append(bar.txt_label.get_text())
+        assert axes.figure.get_facecolor() == (1, 1, 1, 1)
+        assert axes.get_xlabel() == ""
+    assert labels == ["20 mm", "200 mm"] * 2 + ["20 px"]
+    for suffix, start in (("pdf", b"%PDF"), ("svg", b"<?xml")):
+        panels[0].figure.savefig(file := io.BytesIO(), format=suffix)
+        assert file.getvalue().startswith(start)
+    with pytest.raises(pcii.InputError, match="style: expected"):
+        sections.plot(style="print")
+
+
 def test_matplotlib_is_loaded_by_the_first_picture() -> None:
     script = (
         "import sys, pcii, numpy as np;"
