@@ -17,7 +17,6 @@ from pcii.exchange.import_requests import (
     PictureLight,
     WholePair,
     read,
-    values_of,
 )
 from pcii.exchange.stated_cameras import ViewOrder
 from pcii.store.dataset_writer import save_dataset
@@ -117,7 +116,7 @@ def import_dataset(
     options |= {"bitpack": bitpack, "width": width, "frames": frames}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light):
-        options |= values_of(group)
+        options |= vars(group)
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
@@ -130,7 +129,7 @@ def import_dataset(
             images.append(limit_photons(imported.images, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
         z_range = z_range_mm or imported.z_range_mm
-        fit = check_grid(imported.images, z_range, order=order, counted=imported.counted)
+        fit = check_grid(imported.images, z_range, order=order)
         dataset = save_dataset(
             out,
             images,
@@ -160,7 +159,7 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
     """What would make the views fit the cameras, in words of options; None if they do."""
     sentences: list[str] = []
     if fit.order is not None:
-        changes = {n: value for n, value in values_of(fit.order).items() if value != getattr(order, n)}
+        changes = {n: value for n, value in vars(fit.order).items() if value != getattr(order, n)}
         if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
             changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
         flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}

@@ -14,7 +14,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.exchange.image_folders import VIEWS, check_size, files_by_camera, is_picture, pages_of, views_of
+from pcii.exchange.image_folders import VIEWS, files_by_camera, is_picture, pages_of, views_of
 from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of, to_radiance
 from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
 from pcii.types.arrays import whole_counts
@@ -62,13 +62,10 @@ def import_arrays(
             f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
             "--srgb, --linear or --gamma (encoding)"
         )
-    check_size(Path(name), views.shape)
-    radiance = np.empty(views.shape, np.float32)
-    for camera in np.ndindex(*views.shape[:2]):
-        try:
-            radiance[camera] = to_radiance(views[camera], encoding)
-        except InputError as fault:
-            raise InputError(f"{name}: view {camera} {fault}") from None
+    try:
+        radiance = to_radiance(np.asarray(views), encoding)
+    except InputError as fault:
+        raise InputError(f"{name}: {fault}") from None
     return views_of(radiance, optics, cfa)
 
 
@@ -119,7 +116,6 @@ def import_counts(
     if bitpack:
         row = width or 8 * row
     camera_grid = optics.grid((*stacks.shape, height, row))
-    check_size(Path(name), camera_grid.shape_KLHW)
     is_binary = bitpack or first.dtype == np.bool_
     count = stop - begin
     sums = np.zeros(camera_grid.shape_KLHW, np.min_scalar_type(count) if is_binary else np.uint64)

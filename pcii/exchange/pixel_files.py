@@ -115,22 +115,23 @@ def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
     return picture
 
 
-def decode(picture: Picture, *, turn: bool | None = False, alpha: bool = False) -> Iterator[np.ndarray]:
+def decode(picture: Picture) -> Iterator[np.ndarray]:
     """Pixels (H, W, C) of each page of a picture, without alpha.
 
-    With `turn` they are upright, with `turn` None as they are stored, and with `alpha` opacity is a further
-    channel if the file has it. Raises `InputError`, naming the file, for pixels that are not opaque, or have
-    to be turned, and may not be.
+    Raises `InputError`, naming the file, for pixels that are not opaque, or have to be turned.
     """
-    path, pixels, orientation = picture.path, picture.pixels, picture.orientation
-    if picture.alpha and not alpha:
+    pixels = picture.pixels
+    if picture.alpha:
         if not (pixels[..., -1] == picture.most).all():
-            raise InputError(f"{path}: has an alpha channel that is not opaque everywhere; save it without")
+            raise InputError(
+                f"{picture.path}: has an alpha channel that is not opaque everywhere; save it without"
+            )
         pixels = pixels[..., :-1]
-    if orientation != UPRIGHT and turn is False:
-        raise InputError(f"{path}: has to be turned (EXIF orientation {orientation}); save it upright")
-    for page in pixels:
-        yield _turned(page, orientation if turn else UPRIGHT)
+    if picture.orientation != UPRIGHT:
+        raise InputError(
+            f"{picture.path}: has to be turned (EXIF orientation {picture.orientation}); save it upright"
+        )
+    yield from pixels
 
 
 def radiance_of(picture: Picture, pixels: np.ndarray, encoding: Encoding | None) -> np.ndarray:
@@ -277,11 +278,3 @@ def _read_exr(path: Path) -> Picture:
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
     unused = f"the channels {', '.join(others)}"[:80] if others else ""
     return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=unused)
-
-
-def _turned(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Pixels of a file upright: from 5 on its rows are columns; then either may run backwards."""
-    if 5 <= orientation <= 8:
-        pixels = pixels.swapaxes(0, 1)
-    up, left = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
-    return pixels[:: -1 if up else 1, :: -1 if left else 1]
