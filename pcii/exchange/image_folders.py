@@ -17,7 +17,6 @@ from pcii.base.progress import Report, silent
 from pcii.exchange.pixel_files import (
     Encoding,
     Picture,
-    check_encoding,
     decode,
     kind_of,
     picture_of,
@@ -63,7 +62,6 @@ def import_images(
     of which grey pictures are mosaics. `tell` takes the names of files that do not fit the pattern. Raises
     `InputError`, naming a file, for what does not fit.
     """
-    check_encoding(encoding)
     path = Path(source)
     if pattern is None:
         radiance = radiance_of(*pages_of(path, grid, order, tell), encoding)
@@ -138,7 +136,7 @@ def _tell_unused(contents: Sequence[tuple[Path, str]], tell: Tell) -> None:
     """Name what is not used of the content of files."""
     names = [f"{content} in {path.name}" for path, content in contents if content]
     if names:
-        tell(f"not used: {names[0]}{_more(len(names) - 1)}")
+        tell(f"not used: {listed_names(names)}")
 
 
 def files_by_camera(
@@ -203,11 +201,8 @@ def listed_names(names: Sequence[str]) -> str:
     >>> listed_names(["a.png", "b.png", "c.png", "d.png", "e.png"])
     'a.png, b.png, c.png and 2 more'
     """
-    return visible(", ".join(names[:MOST_NAMED])) + _more(len(names) - MOST_NAMED)
-
-
-def _more(count: int) -> str:
-    return f" and {count} more" if count > 0 else ""
+    more = len(names) - MOST_NAMED
+    return visible(", ".join(names[:MOST_NAMED])) + (f" and {more} more" if more > 0 else "")
 
 
 def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
@@ -270,7 +265,6 @@ def import_lens_array(
     is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
     `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
     """
-    check_encoding(encoding)
     picture = picture_of(Path(path), VIEWS)
     if picture.pages > 1:
         raise InputError(f"{path}: has {picture.pages} pages; expected one picture")

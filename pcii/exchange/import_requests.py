@@ -152,7 +152,7 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
     known = result if isinstance(result, KnownViews) else None
     encoding = f", decoded by {values['encoding']}" if values.get("encoding") else ""
     return Imported(
-        result if known is None else known.views,
+        result.views if isinstance(result, KnownViews) else result,
         f"{what} of {source.resolve().name}{encoding}",
         states_cameras="optics" not in parameters,
         truth=known and known.truth,

@@ -35,7 +35,6 @@ UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
 Encoding = Literal["srgb", "linear"] | float
 """How numbers stand for light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
-GAMMAS = (0.1, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +155,9 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None
     >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
     [0.0, 0.502, 1.0]
     """
+    is_number = isinstance(encoding, int | float) and 0.1 <= encoding <= 10
+    if encoding not in (None, "srgb", "linear") and not is_number:
+        raise InputError(f"encoding: expected srgb, linear, or a gamma from 0.1 to 10, got {encoding!r}")
     is_whole = numbers.dtype.kind == "u"
     if not is_whole and not np.isfinite(numbers).all():
         raise InputError("holds NaN or infinity; radiance is finite")
@@ -176,16 +178,6 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None
     if not np.isfinite(linear).all():
         raise InputError("holds light that is too bright for float32")
     return linear
-
-
-def check_encoding(encoding: Any) -> None:
-    """Raise `InputError` unless this is an `Encoding`, or None for the usual one."""
-    is_number = isinstance(encoding, int | float) and GAMMAS[0] <= encoding <= GAMMAS[1]
-    if encoding not in (None, "srgb", "linear") and not is_number:
-        raise InputError(
-            f"encoding: expected srgb, linear, or a gamma from {GAMMAS[0]:g} to {GAMMAS[1]:g}, "
-            f"got {encoding!r}"
-        )
 
 
 def _read_pillow(path: Path) -> Picture:
