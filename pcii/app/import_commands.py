@@ -17,7 +17,6 @@ from pcii.exchange.import_requests import (
     PictureLight,
     WholePair,
     read,
-    values_of,
 )
 from pcii.exchange.stated_cameras import ViewOrder
 from pcii.store.dataset_writer import save_dataset
@@ -104,7 +103,7 @@ def import_dataset(
     options |= {"bitpack": bitpack, "width": width, "frames": frames}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light):
-        options |= values_of(group)
+        options |= vars(group)
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
@@ -117,7 +116,7 @@ def import_dataset(
             images.append(limit_photons(imported.images, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
         z_range = z_range_mm or imported.z_range_mm
-        fit = check_grid(imported.images, z_range, order=order, counted=imported.counted)
+        fit = check_grid(imported.images, z_range, order=order)
         dataset = save_dataset(
             out,
             images,
@@ -133,7 +132,7 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    advice = None if imported.states_cameras else _advice(fit, z_range)
+    advice = None if imported.states_cameras else _advice(fit, order, lenses, z_range)
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
@@ -141,11 +140,19 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _advice(fit: CameraFit, z_range: Pair) -> str | None:
+def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:
     """Which options would make the views fit the cameras; None if they do."""
     if fit.order is not None:
-        names = [f"--{name.replace('_', '-')}" for name, value in values_of(fit.order).items() if value]
-        return f"the views fit together far better with {' '.join(names) or 'no option'} for their order"
+        changes = {n: value for n, value in vars(fit.order).items() if value != getattr(order, n)}
+        if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
+            changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
+        flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}
+        words = [
+            f"{word} --{' --'.join(names).replace('_', '-')}"
+            for word, names in (("with", flags[True]), ("without", flags[False]))
+            if names
+        ]
+        return f"the views fit together far better {' and '.join(words)}"
     if fit.shear_px is not None:
         x, y = fit.shear_px
         return f"things are sharp at disparities below 0; add a shift to --shear-px, {x:g} {y:g} or more"

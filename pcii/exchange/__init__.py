@@ -11,7 +11,7 @@ hci_scenes       The layout of the HCI 4D light field benchmark (Honauer et al. 
 image_folders    Elemental images from pictures: a file a view, a page a view, a picture of a lens array.
 import_requests  Which reader takes a source, and which options go with it.
 pixel_files      Picture files as arrays, and the light that their numbers stand for.
-posed_views      Pictures and photon cubes with the poses of their cameras, which are of one plane grid.
+posed_views      Pictures with the poses of their cameras, which are of one plane grid.
 stated_cameras   Where cameras stand, how they see, and in which order views are stored.
 transforms_file  The file transforms.json of neural reconstruction, read and checked.
 """

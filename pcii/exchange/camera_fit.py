@@ -66,11 +66,10 @@ def check_grid(
     z_range_mm: tuple[float, float] | None = None,
     *,
     order: ViewOrder = AS_STORED,
-    counted: bool = False,
 ) -> CameraFit:
     """Where views are sharp, and what explains them better than their cameras.
 
-    They were stored in the `order`, as a table or `counted` one by one. All depths are looked at whose
+    They were stored in the `order`. All depths are looked at whose
     parallax is not larger than the views, or four times that of a range. Small views, single ones and those
     without texture, or with too few photons, are not judged. Raises `InputError` for a range that is not
     0 < near < far, and for views that hold NaN or infinity.
@@ -86,7 +85,7 @@ def check_grid(
         reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), MIN_CELLS / 2 * side))
     shifts_px = side * np.arange(-np.ceil(reach / side), np.ceil(reach / side) + 1)
     cells = _cells_of(images, side)
-    tables = _tables_of_orders(grid, order, counted)
+    tables = _tables_of_orders(grid, order)
     grids = {one: replace(grid, rows=table.shape[0], cols=table.shape[1]) for one, table in tables.items()}
     variances = {one: _sweep(cells, table, grids[one], shifts_px, side) for one, table in tables.items()}
     remaining = {one: _remaining(variance) for one, variance in variances.items()}
@@ -132,7 +131,7 @@ def check_grid(
     return replace(fit, z_mm=tuple(sorted(depths)))
 
 
-def _tables_of_orders(grid: CameraGrid, order: ViewOrder, counted: bool) -> dict[ViewOrder, np.ndarray]:
+def _tables_of_orders(grid: CameraGrid, order: ViewOrder) -> dict[ViewOrder, np.ndarray]:
     """The number of each camera's view, (K, L), in orders that differ by more than a turn of both axes."""
 
     def numbers(one: ViewOrder, rows: int, cols: int) -> np.ndarray:
@@ -143,7 +142,7 @@ def _tables_of_orders(grid: CameraGrid, order: ViewOrder, counted: bool) -> dict
     tables = {}
     for swap, flip in ((False, False), (False, True), (True, False), (True, True)):
         other = replace(order, swap_axes=order.swap_axes ^ swap, flip_cols=order.flip_cols ^ flip)
-        shape = (grid.cols, grid.rows) if swap and not counted else (grid.rows, grid.cols)
+        shape = (grid.cols, grid.rows) if swap else (grid.rows, grid.cols)
         tables[other] = view_of_stored[numbers(other, *shape)]
     return tables
 

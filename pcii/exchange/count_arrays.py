@@ -7,15 +7,15 @@ is in the highest bit of its first byte, as numpy.packbits has it. Files may be 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.exchange.image_folders import VIEWS, check_size, files_by_camera, is_picture, pages_of, views_of
-from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of, to_radiance
+from pcii.exchange.image_folders import VIEWS, files_by_camera, is_picture, pages_of, views_of
+from pcii.exchange.pixel_files import Encoding, decode, picture_of, to_radiance
 from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
 from pcii.types.arrays import whole_counts
 from pcii.types.images import Views
@@ -45,7 +45,6 @@ def import_arrays(
     file does not tell. `cfa` is a Bayer pattern, of which arrays of one channel are mosaics. Raises
     `InputError` for what does not fit.
     """
-    check_encoding(encoding)
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
     views = order.arrange(_by_camera(numbers, name, grid, order, "H, W[, C]"))
@@ -62,13 +61,10 @@ def import_arrays(
             f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
             "--srgb, --linear or --gamma (encoding)"
         )
-    check_size(Path(name), views.shape)
-    radiance = np.empty(views.shape, np.float32)
-    for camera in np.ndindex(*views.shape[:2]):
-        try:
-            radiance[camera] = to_radiance(views[camera], encoding)
-        except InputError as fault:
-            raise InputError(f"{name}: view {camera} {fault}") from None
+    try:
+        radiance = to_radiance(np.asarray(views), encoding)
+    except InputError as fault:
+        raise InputError(f"{name}: {fault}") from None
     return views_of(radiance, optics, cfa)
 
 
@@ -119,7 +115,6 @@ def import_counts(
     if bitpack:
         row = width or 8 * row
     camera_grid = optics.grid((*stacks.shape, height, row))
-    check_size(Path(name), camera_grid.shape_KLHW)
     is_binary = bitpack or first.dtype == np.bool_
     count = stop - begin
     sums = np.zeros(camera_grid.shape_KLHW, np.min_scalar_type(count) if is_binary else np.uint64)
@@ -208,7 +203,10 @@ def _stacks_of(
     """The frames of each view, (K, L) of `FrameStack`."""
     if pattern is not None:
         paths = order.arrange(files_by_camera(Path(str(source)), pattern, grid, order, tell))
-        return _table_of(paths.shape, lambda camera: (str(paths[camera]), partial(_frames_of, paths[camera])))
+        stacks = np.empty(paths.shape, object)
+        for camera, path in np.ndenumerate(paths):
+            stacks[camera] = FrameStack(str(path), partial(_frames_of, path))
+        return stacks
     if not isinstance(source, np.ndarray) and is_picture(Path(source)):
         _, pages = pages_of(Path(source), grid, order, tell)
         source, grid, order = _without_colours(Path(source), pages), None, AS_STORED
@@ -228,16 +226,9 @@ def _stacks_of(
         raise InputError(f"{name}: expected {shape}, or with --grid one axis of views, got {numbers.shape}")
     if grid is None and numbers.ndim == 4 and numbers.shape[3] in (3, 4):
         raise InputError(f"{name}: has the shape {numbers.shape}, with colours last; photon counts have none")
-    return _table_of(views.shape[:2], lambda camera: (name, partial(load, camera)))
-
-
-def _table_of(
-    shape: tuple[int, ...], stack_of: Callable[[Any], tuple[str, Callable[[], np.ndarray]]]
-) -> np.ndarray:
-    """A table (K, L) of `FrameStack`, by camera."""
-    stacks = np.empty(shape, object)
-    for camera in np.ndindex(*shape):
-        stacks[camera] = FrameStack(*stack_of(camera))
+    stacks = np.empty(views.shape[:2], object)
+    for camera in np.ndindex(*stacks.shape):
+        stacks[camera] = FrameStack(name, partial(load, camera))
     return stacks
 
 

@@ -62,8 +62,12 @@ def pictures_of(dataset: Dataset) -> ViewPictures:
         return _radiance_pictures(dataset, dataset.views)
     counts = dataset.counts
     white = max(int(counts.events.n.max(initial=0)), 1)
+
+    def grey(k: int, l: int) -> np.ndarray:
+        return np.repeat(np.round(255 / white * counts.view(k, l)).astype(np.uint8)[..., None], 3, axis=2)
+
     return ViewPictures(
-        lambda k, l: np.repeat(photon_numbers(counts.view(k, l), white)[..., None], 3, axis=2),
+        grey,
         quantity="photons",
         white=float(white),
         unit="photons",
@@ -88,11 +92,6 @@ def _radiance_pictures(dataset: Dataset, views: Views) -> ViewPictures:
         unit=unit,
         meaning=f"radiance, encoded as sRGB: 255 is {white:.6g} ({unit}) or more; mosaics are demosaiced",
     )
-
-
-def photon_numbers(counts: np.ndarray, white: float) -> np.ndarray:
-    """Numbers, uint8, of counts up to `white` photons; up to 255 photons each count has its own number."""
-    return np.round(255 / white * counts).astype(np.uint8)
 
 
 def view_name(grid: CameraGrid, k: int, l: int) -> str:

@@ -3,10 +3,9 @@
 A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text.
 """
 
-import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -16,10 +15,8 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.exchange.pixel_files import (
-    LARGEST_BYTES,
     Encoding,
     Picture,
-    check_encoding,
     decode,
     kind_of,
     picture_of,
@@ -65,17 +62,13 @@ def import_images(
     of which grey pictures are mosaics. `tell` takes the names of files that do not fit the pattern. Raises
     `InputError`, naming a file, for what does not fit.
     """
-    check_encoding(encoding)
     path = Path(source)
     if pattern is None:
-        picture, pages = pages_of(path, grid, order, tell)
-        shape = pages.shape[:2]
-        views = ((camera, picture, pages[camera]) for camera in np.ndindex(shape))
+        radiance = radiance_of(*pages_of(path, grid, order, tell), encoding)
     else:
         files = order.arrange(files_by_camera(path, pattern, grid, order, tell))
-        shape = files.shape
-        views = ((camera, picture, next(decode(picture))) for camera, picture in pictures_of(files, tell))
-    return views_of(radiance_of_views(path, shape, views, encoding, report), optics, cfa)
+        radiance = radiance_of_files(files, encoding, report, tell)
+    return views_of(radiance, optics, cfa)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,21 +80,25 @@ class KnownViews:
     z_range_mm: tuple[float, float] | None = None
 
 
-def radiance_of_views(
-    path: Path,
-    shape: tuple[int, ...],
-    views: Iterable[tuple[tuple[int, ...], Picture, np.ndarray]],
-    encoding: Encoding | None,
-    report: Report,
-) -> np.ndarray:
-    """Radiance (K, L, H, W, C) of pixels by camera (k, l); `path` is named if all need too much memory."""
-    radiance = np.empty(0)
-    for done, (camera, picture, pixels) in enumerate(views, start=1):
-        if done == 1:
-            check_size(path, (*shape, *picture.shape))
-            radiance = np.empty((*shape, *picture.shape), np.float32)
-        radiance[camera] = radiance_of(picture, pixels, encoding)
-        report("pictures", done, math.prod(shape))
+def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Report, tell: Tell) -> np.ndarray:
+    """Radiance (K, L, H, W, C) of pictures of one size and type, whose files are (K, L).
+
+    `tell` takes what else is in them. Raises `InputError`, naming the file, if one differs.
+    """
+    radiance, first, unused = np.empty(0), None, []
+    for done, (camera, path) in enumerate(np.ndenumerate(files), start=1):
+        picture = picture_of(path, VIEWS)
+        if picture.pages > 1:
+            raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
+        if first is None:
+            first = path.name, picture.layout()
+            radiance = np.empty((*files.shape, *picture.shape), np.float32)
+        if picture.layout() != first[1]:
+            raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
+        unused.append((path, picture.unused))
+        radiance[camera] = radiance_of(picture, next(decode(picture)), encoding)
+        report("pictures", done, files.size)
+    _tell_unused(unused, tell)
     return radiance
 
 
@@ -135,39 +132,11 @@ def pages_of(
     return picture, order.arrange(pixels.reshape(*table, *pixels.shape[1:]))
 
 
-def pictures_of(files: np.ndarray, tell: Tell) -> Iterator[tuple[tuple[int, ...], Picture]]:
-    """Pictures of one size and type, by camera (k, l), of files (K, L); `InputError` if one differs.
-
-    `tell` takes what else is in them.
-    """
-    first, others = None, []
-    for camera, path in np.ndenumerate(files):
-        picture = picture_of(path, VIEWS)
-        if picture.pages > 1:
-            raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
-        first = first or (path.name, picture.layout())
-        if picture.layout() != first[1]:
-            raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
-        others.append((path, picture.unused))
-        yield camera, picture
-    _tell_unused(others, tell)
-
-
 def _tell_unused(contents: Sequence[tuple[Path, str]], tell: Tell) -> None:
     """Name what is not used of the content of files."""
     names = [f"{content} in {path.name}" for path, content in contents if content]
     if names:
-        tell(f"not used: {names[0]}{_more(len(names) - 1)}")
-
-
-def check_size(path: Path, shape: Sequence[int]) -> None:
-    """Raise `InputError` if float32 views of a shape need more memory than is allowed."""
-    needed = 4 * math.prod(shape)
-    if needed > LARGEST_BYTES:
-        raise InputError(
-            f"{path}: views of {' x '.join(map(str, shape))} need {needed / 2**30:.1f} GiB, and at most "
-            f"{LARGEST_BYTES / 2**30:g} are allowed; make the pictures smaller or leave views out"
-        )
+        tell(f"not used: {listed_names(names)}")
 
 
 def files_by_camera(
@@ -218,10 +187,9 @@ def files_by_camera(
     count = math.prod(table) - len(files)
     if count:
         views = (tuple(a + b for a, b in zip(first, step, strict=True)) for step in np.ndindex(*size))
-        missing = itertools.islice((view for view in views if view not in files), MOST_NAMED)
-        some = [_file_name(pattern, names, view) for view in missing]
-        listed = f"{visible(', '.join(some))}{_more(count - len(some))}"
-        raise InputError(f"{folder}: missing of {table[0]} x {table[1]} views: {listed}")
+        view = next(view for view in views if view not in files)
+        numbers_of = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
+        raise InputError(f"{folder}: {count} of {table[0]} x {table[1]} views missing, first {numbers_of}")
     paths = np.empty(len(files), dtype=object)
     paths[:] = [files[view] for view in sorted(files)]
     return paths.reshape(table)
@@ -233,11 +201,8 @@ def listed_names(names: Sequence[str]) -> str:
     >>> listed_names(["a.png", "b.png", "c.png", "d.png", "e.png"])
     'a.png, b.png, c.png and 2 more'
     """
-    return visible(", ".join(names[:MOST_NAMED])) + _more(len(names) - MOST_NAMED)
-
-
-def _more(count: int) -> str:
-    return f" and {count} more" if count > 0 else ""
+    more = len(names) - MOST_NAMED
+    return visible(", ".join(names[:MOST_NAMED])) + (f" and {more} more" if more > 0 else "")
 
 
 def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
@@ -256,12 +221,6 @@ def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
         plain = "[^/]*" if part == "*" else re.escape(part)
         parts[number] = plain if field is None else f"(?P<{field[1]}>[+-]?[0-9]+)"
     return re.compile("".join(parts), re.IGNORECASE), names
-
-
-def _file_name(pattern: str, names: Sequence[str], view: Sequence[int]) -> str:
-    """The name that a file of a view would have."""
-    numbers = dict(zip(names, view, strict=True))
-    return FIELD.sub(lambda field: format(numbers[field[1]], field[2] or ""), pattern)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +265,6 @@ def import_lens_array(
     is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
     `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
     """
-    check_encoding(encoding)
     picture = picture_of(Path(path), VIEWS)
     if picture.pages > 1:
         raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
@@ -316,7 +274,6 @@ def import_lens_array(
     across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
     down = _starts(lenses.rows, lenses.pitch_px[1], lenses.offset_px[1], height, "high", path)
     size = math.floor(lenses.pitch_px[1]), math.floor(lenses.pitch_px[0])
-    check_size(Path(path), (lenses.rows, lenses.cols, *size, channels))
     starts_evenly = not (np.concatenate([across, down]) % 2).any()
     if cfa is not None and channels == 1 and (lenses.inverted or not starts_evenly):
         raise InputError(

@@ -84,10 +84,8 @@ class Imported:
     origin: str
     states_cameras: bool
     """Whether the source itself states the cameras, which are then not questioned."""
-    counted: bool
-    """Whether views are counted one by one, not stored by row and column."""
-    truth: Truth | None = None
-    z_range_mm: Pair = None
+    truth: Truth | None
+    z_range_mm: Pair
 
 
 READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
@@ -106,11 +104,6 @@ GROUPS: dict[str, type[Any]] = {
     "encoding": PictureLight,
 }
 """Parameters of readers that stand for the options of a group."""
-
-
-def values_of(group: Any) -> dict[str, Any]:
-    """The options of a group by name."""
-    return {field.name: getattr(group, field.name) for field in fields(group)}
 
 
 def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any]:
@@ -156,18 +149,14 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
             values[name] = build(options)
     values["order"] = ViewOrder(**{field.name: options[field.name] for field in fields(ViewOrder)})
     result = reader(source, **{name: values[name] for name in parameters})
-    images, known = result, {}
-    if isinstance(result, KnownViews):
-        images = result.views
-        known = {name: getattr(result, name) for name in ("truth", "z_range_mm")}
-    pattern, encoding = options["pattern"], values.get("encoding")
-    is_counted = options["grid"] is not None or is_picture(source)
+    known = result if isinstance(result, KnownViews) else None
+    encoding = f", decoded by {values['encoding']}" if values.get("encoding") else ""
     return Imported(
-        images,
-        f"{what} of {source.resolve().name}" + (f", decoded by {encoding}" if encoding else ""),
+        result.views if isinstance(result, KnownViews) else result,
+        f"{what} of {source.resolve().name}{encoding}",
         states_cameras="optics" not in parameters,
-        counted="{index" in pattern if pattern else "grid" in parameters and is_counted,
-        **known,
+        truth=known and known.truth,
+        z_range_mm=known and known.z_range_mm,
     )
 
 
@@ -187,12 +176,12 @@ def _optics(options: Mapping[str, Any]) -> Optics:
 
 def _lens_array(options: Mapping[str, Any]) -> LensArray:
     """Where lenses are; `InputError` without their pitch."""
-    (rows, cols), pitch_px = options["lens_array"], options["lens_pitch_px"]
-    if pitch_px is None:
+    if options["lens_pitch_px"] is None:
         raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
-    offset_px = options["lens_offset_px"] or (0.0, 0.0)
+    rows, cols = options["lens_array"]
+    offset_px, inverted = options["lens_offset_px"] or (0.0, 0.0), options["inverted"]
     return LensArray(
-        rows=rows, cols=cols, pitch_px=pitch_px, offset_px=offset_px, inverted=options["inverted"]
+        rows=rows, cols=cols, pitch_px=options["lens_pitch_px"], offset_px=offset_px, inverted=inverted
     )
 
 

@@ -35,7 +35,6 @@ UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
 Encoding = Literal["srgb", "linear"] | float
 """How numbers stand for light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
-GAMMAS = (0.1, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,22 +114,23 @@ def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
     return picture
 
 
-def decode(picture: Picture, *, turn: bool | None = False, alpha: bool = False) -> Iterator[np.ndarray]:
+def decode(picture: Picture) -> Iterator[np.ndarray]:
     """Pixels (H, W, C) of each page of a picture, without alpha.
 
-    With `turn` they are upright, with `turn` None as they are stored, and with `alpha` opacity is a further
-    channel if the file has it. Raises `InputError`, naming the file, for pixels that are not opaque, or have
-    to be turned, and may not be.
+    Raises `InputError`, naming the file, for pixels that are not opaque, or have to be turned.
     """
-    path, pixels, orientation = picture.path, picture.pixels, picture.orientation
-    if picture.alpha and not alpha:
+    pixels = picture.pixels
+    if picture.alpha:
         if not (pixels[..., -1] == picture.most).all():
-            raise InputError(f"{path}: has an alpha channel that is not opaque everywhere; save it without")
+            raise InputError(
+                f"{picture.path}: has an alpha channel that is not opaque everywhere; save it without"
+            )
         pixels = pixels[..., :-1]
-    if orientation != UPRIGHT and turn is False:
-        raise InputError(f"{path}: has to be turned (EXIF orientation {orientation}); save it upright")
-    for page in pixels:
-        yield _turned(page, orientation if turn else UPRIGHT)
+    if picture.orientation != UPRIGHT:
+        raise InputError(
+            f"{picture.path}: has to be turned (EXIF orientation {picture.orientation}); save it upright"
+        )
+    yield from pixels
 
 
 def radiance_of(picture: Picture, pixels: np.ndarray, encoding: Encoding | None) -> np.ndarray:
@@ -155,6 +155,9 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None
     >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
     [0.0, 0.502, 1.0]
     """
+    is_number = isinstance(encoding, int | float) and 0.1 <= encoding <= 10
+    if encoding not in (None, "srgb", "linear") and not is_number:
+        raise InputError(f"encoding: expected srgb, linear, or a gamma from 0.1 to 10, got {encoding!r}")
     is_whole = numbers.dtype.kind == "u"
     if not is_whole and not np.isfinite(numbers).all():
         raise InputError("holds NaN or infinity; radiance is finite")
@@ -175,16 +178,6 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None
     if not np.isfinite(linear).all():
         raise InputError("holds light that is too bright for float32")
     return linear
-
-
-def check_encoding(encoding: Any) -> None:
-    """Raise `InputError` unless this is an `Encoding`, or None for the usual one."""
-    is_number = isinstance(encoding, int | float) and GAMMAS[0] <= encoding <= GAMMAS[1]
-    if encoding not in (None, "srgb", "linear") and not is_number:
-        raise InputError(
-            f"encoding: expected srgb, linear, or a gamma from {GAMMAS[0]:g} to {GAMMAS[1]:g}, "
-            f"got {encoding!r}"
-        )
 
 
 def _read_pillow(path: Path) -> Picture:
@@ -277,11 +270,3 @@ def _read_exr(path: Path) -> Picture:
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
     unused = f"the channels {', '.join(others)}"[:80] if others else ""
     return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=unused)
-
-
-def _turned(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Pixels of a file upright: from 5 on its rows are columns; then either may run backwards."""
-    if 5 <= orientation <= 8:
-        pixels = pixels.swapaxes(0, 1)
-    up, left = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
-    return pixels[:: -1 if up else 1, :: -1 if left else 1]

@@ -12,8 +12,8 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.exchange.export_pictures import MM_PER_M
-from pcii.exchange.image_folders import pictures_of, radiance_of_views, views_of
-from pcii.exchange.pixel_files import Encoding, check_encoding, decode
+from pcii.exchange.image_folders import radiance_of_files, views_of
+from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.stated_cameras import Tell, warn
 from pcii.exchange.transforms_file import MOST_PX, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
@@ -67,13 +67,11 @@ def import_posed_pictures(
     `cfa` is a Bayer pattern, of which grey pictures are mosaics. Raises `InputError`, naming file and member,
     frame or picture, for what is missing, wrong, or no such grid.
     """
-    check_encoding(encoding)
     file = read_transforms(source, tell=tell)
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
     files = np.array(file.file_paths, object)[poses.numbers]
-    views = ((camera, picture, next(decode(picture))) for camera, picture in pictures_of(files, tell))
-    radiance = radiance_of_views(file.path, files.shape, views, encoding, report)
+    radiance = radiance_of_files(files, encoding, report, tell)
     if radiance.shape[2:4] != grid.shape_HW:
         raise InputError(
             f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "

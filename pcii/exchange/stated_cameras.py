@@ -45,12 +45,7 @@ class Optics:
 
     def pixel_of(self, width: int) -> float:
         """Side of a pixel in mm of pictures that are `width` px wide."""
-        if self.sensor_mm is None:
-            return cast(float, self.pixel_mm)
-        side = self.sensor_mm
-        if isinstance(side, bool) or not isinstance(side, int | float) or not 0 < side < np.inf:
-            raise InputError(f"sensor_mm: expected a finite length above 0 mm, got {side!r}")
-        return side / width
+        return cast(float, self.pixel_mm if self.sensor_mm is None else self.sensor_mm / width)
 
     def grid(self, shape: tuple[int, ...]) -> CameraGrid:
         """The camera grid of views of the shape (K, L, H, W, ...); raises `InputError` for a wrong length."""

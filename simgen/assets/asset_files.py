@@ -7,7 +7,7 @@ the normals of both kinds of mesh.
 import contextlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from pcii.exchange.pixel_files import decode, picture_of
+from pcii.exchange.pixel_files import UPRIGHT, decode, picture_of
 from simgen.assets.triangles import Triangles, fan_all
 from simgen.base.file_lookup import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
 from simgen.base.strict_models import shorten
@@ -83,12 +83,24 @@ def read_texture(path: Path, *, for_gltf: bool = False) -> np.ndarray:
     picture = picture_of(path, ("PNG", "JPEG", "TIFF"))
     if picture.pages != 1 or picture.dtype.kind == "f":
         raise InputError(f"{path}: has {picture.layout()}; save one page as RGB or grey of 8 or 16 bits")
-    (pixels,) = decode(picture, turn=None if for_gltf else True, alpha=for_gltf)
+    if for_gltf:
+        pixels = picture.pixels[0]
+    else:
+        (pixels,) = decode(replace(picture, orientation=UPRIGHT))
+        pixels = _turn_upright(pixels, picture.orientation)
     if picture.dtype == np.bool_ or picture.bits is not None:
         pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
     if picture.shape[2] == 1:
         pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=2), pixels[..., 1:]], axis=2)
     return pixels
+
+
+def _turn_upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
+    """Pixels of a file upright: from 5 on its rows are columns; then either may run backwards."""
+    if 5 <= orientation <= 8:
+        pixels = pixels.swapaxes(0, 1)
+    up, left = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
+    return pixels[:: -1 if up else 1, :: -1 if left else 1]
 
 
 def read_environment(path: Path) -> np.ndarray:

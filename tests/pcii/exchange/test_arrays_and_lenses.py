@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import tifffile
 from picture_folders import OPTICS, H, W, numbers, write
-from PIL import Image
 from rendered_cards import Card, render
 
 from pcii import (
@@ -198,20 +197,6 @@ def test_frames_of_photons_are_added_up(tmp_path: Path, kind: str) -> None:
     np.testing.assert_array_equal(counts.dense, FRAMES.sum(axis=2))
     assert counts.readout.frames == 7
     assert (counts.frame is not None) == (kind == "bool")  # of one bit the frame of each count is kept
-
-
-def test_one_bit_pictures_are_counts(tmp_path: Path) -> None:
-    for k, l in np.ndindex(2, 3):
-        Image.fromarray(FRAMES[k, l, 0].astype(bool)).save(tmp_path / f"{k}-{l}.png")
-    counts = import_counts(tmp_path, OPTICS, pattern="{row}-{col}.png")
-    np.testing.assert_array_equal(counts.dense, FRAMES[:, :, 0])
-
-
-def test_frames_are_not_averaged_over_their_faults() -> None:
-    frames = FRAMES.astype(float)
-    frames[0, 0, 0, 0, 0], frames[0, 0, 1, 0, 0] = 0.5, 0.5
-    with pytest.raises(ValueError, match="whole numbers"):
-        import_counts(frames, OPTICS)
 
 
 def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:

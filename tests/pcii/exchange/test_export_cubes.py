@@ -84,14 +84,3 @@ def test_other_counts_are_refused_in_a_sentence(tmp_path: Path) -> None:
     data = pcii.save_dataset(tmp_path / "single", single_frame)
     out = pcii.export_dataset(data, "photoncube", tmp_path / "out")
     np.testing.assert_array_equal(np.load(out / "01_02" / "frames.npy"), packed(bits[1, 2, :1]))
-
-
-def test_visionsim_reads_the_frames(tmp_path: Path) -> None:
-    module = pytest.importorskip("visionsim.dataset")
-    bits = bits_of(GRID)
-    out = write_cubes(tmp_path, bits, GRID)
-    for k, l in np.ndindex(2, 3):
-        data = module.Dataset.from_path(out / f"0{k}_0{l}", mode="npy")
-        assert data.full_shape == (FRAMES, 11, 13, 1)
-        frames = np.stack([np.asarray(data[t][1]).reshape(11, 13) for t in range(len(data))])
-        np.testing.assert_array_equal(frames, bits[k, l])

@@ -35,13 +35,7 @@ class Published:
         self.cols, self.rows = int(outside["num_cams_x"]), int(outside["num_cams_y"])
         self.baseline_mm, self.focus_m = float(outside["baseline_mm"]), float(outside["focus_distance_m"])
         self.offset_px = float(outside["offset"])
-        for name in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"):
-            float(outside[f"center_cam_{name}"])
         self.disp_min, self.disp_max = float(meta["disp_min"]), float(meta["disp_max"])
-        for name in ("frustum_disp_min", "frustum_disp_max", "depth_map_scale"):
-            float(meta[name])
-        for name in ("scene", "category", "date", "version", "authors", "contact"):
-            assert isinstance(meta[name], str)
         files = sorted(folder.glob("input_*.png"))
         assert len(files) == self.rows * self.cols
         images = np.array([np.array(Image.open(file)) for file in files])

@@ -112,16 +112,6 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
         check_counts(counts, seen)
 
 
-@pytest.mark.parametrize(
-    ("dtype", "frames"),
-    [(np.uint8, 1), (np.uint8, 2), (np.uint16, 9), (np.int64, 9), (np.float32, 9)],
-)
-def test_frames_of_any_numbers_are_added_up(dtype, frames) -> None:
-    counts = import_counts(BITS[:, :, :frames].astype(dtype), OPTICS)
-    assert (counts.readout.frames, counts.readout.bits) == (frames, None)
-    np.testing.assert_array_equal(counts.dense, BITS[:, :, :frames].sum(axis=2))
-
-
 def test_many_single_counts_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(count_arrays, "MOST_KEPT", 100)
     source = files_of(tmp_path / "views", BITS)

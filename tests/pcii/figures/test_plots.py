@@ -1,5 +1,6 @@
 """What pictures and `.plot()` show: the right values in the right places, bright enough to be seen."""
 
+import io
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,10 +10,11 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib import colormaps
+from matplotlib import colormaps, style
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
 import pcii
@@ -201,7 +203,8 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
 
 def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_and_svg() -> None:
     grid = unit_grid(3, 3, 12, 100)  # at 1 mm a pixel is 1 mm wide
-    sections = pcii.reconstruct(pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid), [1.0, 10.0])
+    counts = pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid)
+    sections = pcii.reconstruct(counts, [1.0, 10.0])
     focus = pcii.Segmented(np.zeros((2, 12, 100), bool), "by hand", sections)
     depth = pcii.DepthMap(np.full((12, 100), 9.0), np.ones((12, 100)))
     with style.context("dark_background"):
