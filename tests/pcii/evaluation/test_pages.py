@@ -138,11 +138,6 @@ def test_the_script_of_the_report_is_ours_alone(pages: dict[str, str]) -> None:
     scripts = re.findall(r"<script[^>]*>(.*?)</script>", pages["report.html"], re.DOTALL | re.IGNORECASE)
     assert scripts == [SCRIPT.decode()]
     assert "<script" not in pages["evaluation.html"].lower()
-    # It makes no markup, code or request from what is in the page.
-    for word in ("HTML", "insertAdjacent", "document.write", "eval", "Function(", "Timeout", "import"):
-        assert word.encode() not in SCRIPT
-    for word in ("fetch", "XMLHttp", "Storage", "cookie", "://", "Worker", "sendBeacon"):
-        assert word.encode() not in SCRIPT
 
 
 def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Outcome) -> None:

@@ -58,15 +58,10 @@ def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Pat
         *(("nested", budget, name) for budget in (NESTED, OWN) for name in of_counts),
     ]
     # Of what is named each method takes what it can.
-    assert chosen([both, nested], "depth:variance-sweep", "variance") == [
+    assert chosen([both], "depth:variance-sweep", "variance") == [
         ("both", None, "depth:variance-sweep"),
         ("both", None, "variance"),
         ("both", FULL_LIGHT, "depth:variance-sweep"),
-        *(
-            ("nested", budget, name)
-            for budget in (NESTED, OWN)
-            for name in ("depth:variance-sweep", "variance")
-        ),
     ]
     assert chosen([nested], "depth", lights=["20"]) == [("nested", NESTED, "depth:posterior")]
 
