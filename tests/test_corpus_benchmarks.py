@@ -6,7 +6,6 @@ from typing import Any
 from benchmarks import depth
 from benchmarks.corpus import Entry, load_corpus, work_list
 from benchmarks.drawn import KINDS, write_recipe
-from benchmarks.removal import mean_iou
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.rows import frame_of
 from simgen.dataset.prepared import prepare
@@ -38,8 +37,8 @@ def test_every_kind_of_drawn_scene_is_seen_by_the_papers_cameras(tmp_path: Path)
         assert prepare(recipe, near).scene.title == f"Drawn: {kind} 7"
 
 
-def evaluation_of(means: dict[tuple[str, float, str], Any], *, of_depth: bool = False) -> Evaluation:
-    """Two datasets of each recipe, by light and method, which differ by 0.5 and have these means."""
+def evaluation_of(means: dict[tuple[str, float, str], Any]) -> Evaluation:
+    """Two datasets of each recipe, by light and method of depth, which differ by 0.5 and have these means."""
     rows = []
     for (recipe, light, method), mean in means.items():
         for seed in (0, 1):
@@ -51,11 +50,7 @@ def evaluation_of(means: dict[tuple[str, float, str], Any], *, of_depth: bool = 
                 "title": recipe,
             }
             row |= {"seed": seed, "budget": light, "photons_per_view": light, "seconds": 1.0}
-            if of_depth:
-                rows.append(row | {"method": f"depth:{method}", "depth": {"bad_1px": value}})
-            else:
-                planes = [{"z_mm": 500.0, "object": "ball", "truth": "object", "iou": value}]
-                rows.append(row | {"method": method, "planes": planes})
+            rows.append(row | {"method": f"depth:{method}", "depth": {"bad_1px": value}})
     return Evaluation(Path("out"), frame_of(rows), {})
 
 
@@ -65,20 +60,6 @@ ENTRIES = {
     "c": Entry(recipe="stones", half="test", kind="textured"),
     "e": Entry(recipe="blank", half="test", kind="empty"),
 }
-
-
-def test_means_by_half_and_kind_are_counted_by_hand() -> None:
-    scores = {("a", 30.0): 0.25, ("a", 100.0): 0.5, ("b", 30.0): 0.75, ("b", 100.0): 0.5, ("c", 30.0): 0.5}
-    evaluation = evaluation_of({(*key, "m"): mean for key, mean in (scores | {("d", 30.0): 0.0}).items()})
-    table = mean_iou(evaluation, ENTRIES)
-    assert table.header == ("half", "kind", "method", "scenes", "30", "100")
-    assert table.rows == (
-        ("test", "all", "m", "1", "0.500", "–"),
-        ("test", "textured", "m", "1", "0.500", "–"),
-        ("train", "all", "m", "2", "0.500", "0.500"),
-        ("train", "cluttered", "m", "1", "0.750", "0.500"),
-        ("train", "textured", "m", "1", "0.250", "0.500"),
-    )
 
 
 def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_light() -> None:
@@ -95,7 +76,7 @@ def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_lig
         ("d", 30.0, "focus"): 0.5,  # of no scene of the corpus
         ("e", 30.0, "focus"): None,  # a scene without objects
     }
-    text = "\n".join(depth.report(evaluation_of(errors, of_depth=True), ENTRIES))
+    text = "\n".join(depth.report(evaluation_of(errors), ENTRIES))
     assert "10 datasets" in text
     for row in (
         "| test | textured | stones | depth:focus | 1 | 0.500 | – |",

@@ -107,11 +107,7 @@ def read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
 
 
 def light_folder(light: Budget) -> str:
-    """What the folder of results from so many photons per view is called.
-
-    >>> light_folder(1000.0), light_folder("full-light")
-    ('1000', 'full-light')
-    """
+    """What the folder of results in a light is called, such as "1000" or "full-light"."""
     return light if isinstance(light, str) else f"{light:.15g}"
 
 

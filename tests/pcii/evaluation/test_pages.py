@@ -3,15 +3,12 @@
 import base64
 import hashlib
 import re
-import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
-from chromium import CHROMIUM
-from hostile_names import DO, NAMES, RAN
-from jinja2 import UndefinedError
+from hostile_names import DO, NAMES
 from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 
@@ -20,7 +17,7 @@ from pcii.app.report import write_report
 from pcii.base.plain_text import visible
 from pcii.evaluation import pages as pages_module
 from pcii.evaluation import tables
-from pcii.evaluation.pages import page, write_evaluation
+from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import frame_of, origin_of
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import FULL_LIGHT, open_dataset
@@ -141,11 +138,6 @@ def test_the_script_of_the_report_is_ours_alone(pages: dict[str, str]) -> None:
     scripts = re.findall(r"<script[^>]*>(.*?)</script>", pages["report.html"], re.DOTALL | re.IGNORECASE)
     assert scripts == [SCRIPT.decode()]
     assert "<script" not in pages["evaluation.html"].lower()
-    # It makes no markup, code or request from what is in the page.
-    for word in ("HTML", "insertAdjacent", "document.write", "eval", "Function(", "Timeout", "import"):
-        assert word.encode() not in SCRIPT
-    for word in ("fetch", "XMLHttp", "Storage", "cookie", "://", "Worker", "sendBeacon"):
-        assert word.encode() not in SCRIPT
 
 
 def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Outcome) -> None:
@@ -167,21 +159,15 @@ def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None
             assert texts.count(f"{shown} (scene={scene})") == (2 + 1) + 2 * (2 + 1)
 
 
-def test_what_a_page_lacks_is_no_empty_place() -> None:
-    with pytest.raises(UndefinedError, match="notes"):
-        page("evaluation.html.j2", {})
-
-
 def test_a_page_of_200_scenes_is_small_and_in_their_order(tmp_path: Path) -> None:
-    lights, methods = (30.0, 100.0, 300.0, 1000.0, FULL_LIGHT), [f"depth:{letter}" for letter in "abcde"]
     rows = [
         {"dataset": "d", "identity": f"{scene} {seed}", "seed": seed, "recipe": str(scene), "seconds": 1.0}
-        | {"title": f"scene {scene}", "budget": light, "method": method, "photons_per_view": 1.0}
+        | {"title": f"scene {scene}", "budget": light, "method": f"depth:{letter}", "photons_per_view": 1.0}
         | {"depth": {"bad_1px": (scene + seed + number) / 210}}
         for scene in range(200)[::-1]
         for seed in (1, 2)
-        for light in lights
-        for number, method in enumerate(methods)
+        for light in (30.0, 100.0, 300.0, 1000.0, FULL_LIGHT)
+        for number, letter in enumerate("abcde")
     ]
     (tmp_path / "rows.jsonl").touch()
     write_evaluation(tmp_path, frame_of(rows), origin_of(rows))
@@ -193,24 +179,3 @@ def test_a_page_of_200_scenes_is_small_and_in_their_order(tmp_path: Path) -> Non
     # 0 to 199 over 210, and half of 1 and 2: the mean of all scenes.
     assert f"<td>{(199 / 2 + 1.5) / 210:.3f} (" in text
     assert tables.MAX_DETAILED_SCENES < 200
-
-
-def root_element(file: Path) -> str:
-    """The root of the page's document after a browser has opened it, for two seconds of its own time."""
-    command = [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=2000"]
-    command += [f"--user-data-dir={file.parent / 'profile'}", "--dump-dom", file.as_uri()]
-    found = subprocess.run(command, capture_output=True, timeout=120, check=False).stdout
-    return re.search(rb"<html[^>]*>", found)[0].decode() if found else ""  # type: ignore[index]
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
-def test_a_browser_carries_nothing_out(pages: dict[str, str], tmp_path: Path) -> None:
-    torn = "<!doctype html><html><body>{}</body></html>"
-    (tmp_path / "torn.html").write_text(torn.format("".join(NAMES[5:7])))
-    if RAN not in root_element(tmp_path / "torn.html"):
-        pytest.skip("this browser does not open pages here")
-    for which in ("report.html", "evaluation.html"):
-        for policy in (POLICIES[which], ""):  # escaping must do without it: older readers ignore policies
-            assert POLICIES[which] in pages[which]
-            (tmp_path / which).write_text(pages[which].replace(POLICIES[which], policy))
-            assert root_element(tmp_path / which) == '<html lang="en">'

@@ -104,9 +104,8 @@ def test_functions_of_ones_own_are_run_each_into_a_folder_of_its_own(
         assert command_line.run(app, [*repeated, "--budget", "30"]) == 0
         assert (out / "rows.jsonl").stat().st_size == before
     capsys.readouterr()
-    for wrong in ("a_method_of_mine:nothing", "no_such_module:everything", "no-such-method"):
-        assert command_line.run(app, ["benchmark", "run", wrong, *options, "-o", "other"]) == 2
-        assert wrong in capsys.readouterr().err
+    assert command_line.run(app, ["benchmark", "run", "no-such-method", *options, "-o", "other"]) == 2
+    assert "no-such-method" in capsys.readouterr().err
     absent = ["benchmark", "run", methods[0], *options, "--budget", "77", "-o", "other"]
     assert command_line.run(app, absent) == 2
     assert "no dataset of the development half that" in capsys.readouterr().err
@@ -140,10 +139,6 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: (f / SUBMISSION).write_text('{"benchmark": "large", "method": "mine"}'),
         "benchmark: is 'large', but the data are of 'small'",
     ),
-    "a method's name that is taken": (
-        lambda f: (f / SUBMISSION).write_text('{"benchmark": "small", "method": "likelihood"}'),
-        "methods: the name 'likelihood' is taken",
-    ),
     "a dataset that is not there": (
         lambda f: shutil.copytree(f / "pair_photons_1", f / "pear_photons_1"),
         "pear_photons_1/.*: is no result of this half; expected files DATASET/LIGHT/depth.npz or masks.npz",
@@ -160,10 +155,6 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
         r"pair_photons_2/1000/\w+.npz: is missing, and of this light it is needed of all datasets$",
     ),
-    "a field that is not known": (
-        lambda f: (f / SUBMISSION).write_text('{"benchmark": "small", "method": "mine", "author": "A. N."}'),
-        "submission.json: 'author': Extra inputs are not permitted; expected a JSON object of benchmark",
-    ),
     "a map of another size": (
         lambda f: np.savez(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.ones((130, 14))),
         r"depth.npz: expected numbers z_mm \(130, 140\), confidence \(130, 140\), of which z_mm is needed",
@@ -171,10 +162,6 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "depths below 0": (
         lambda f: np.savez(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=-np.ones(SHAPE)),
         "depth.npz: z_mm: depths are above 0 mm",
-    ),
-    "objects": (
-        lambda f: np.savez(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.full(SHAPE, None)),
-        "depth.npz: damaged, or no .npz file of plain numbers",
     ),
     "masks of shares": (
         lambda f: np.savez(f / "pair_photons_1" / "1000" / "masks.npz", in_focus=np.full((2, *SHAPE), 0.5)),

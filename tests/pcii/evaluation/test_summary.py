@@ -14,18 +14,16 @@ from pcii.evaluation.summary import (
     Kind,
     mean_interval,
     means,
+    means_over_scenes,
     ranks,
     sign_flip_p,
 )
 
 
-@pytest.mark.parametrize("n", [2, 3, 20])
-def test_the_interval_is_students(n: int) -> None:
-    x = np.random.default_rng(n).normal(0.7, 0.1, n)
+def test_the_interval_is_students() -> None:
+    x = np.random.default_rng(3).normal(0.7, 0.1, 20)
     known = stats.ttest_1samp(x, 0).confidence_interval(0.95)
-    found = mean_interval(x.tolist())
-    assert (found.n, found.mean) == (n, pytest.approx(x.mean()))
-    assert (found.low, found.high) == (pytest.approx(known.low), pytest.approx(known.high))
+    assert mean_interval(x.tolist()) == pytest.approx((20, x.mean(), known.low, known.high))
 
 
 def test_intervals_by_hand() -> None:
@@ -38,9 +36,6 @@ def test_intervals_by_hand() -> None:
     # Logarithms 0 and 2: mean 1, half 12.7062 * sqrt(2) / sqrt(2).
     geometric = mean_interval([1.0, np.exp(2.0)], "geometric")
     assert geometric == pytest.approx((2, np.e, np.exp(1 - 12.7062), np.exp(1 + 12.7062)), rel=1e-4)
-    # One of five took a hundred times as long: Student's interval of the mean itself is from -32 to 74.
-    assert 0 < mean_interval([1.0, 1.0, 1.0, 1.0, 100.0], "positive").low < 20.8
-    assert mean_interval([1.0, 1.0, 1.0, 1.0, 100.0]).low < -30
 
 
 @pytest.mark.parametrize("kind", ["signed", "share", "positive"])
@@ -77,18 +72,6 @@ def test_the_interval_covers_the_truth_as_often_as_it_says() -> None:
     assert abs(by_normal / TRIALS - 0.95) > TOLERANCE
 
 
-def test_the_interval_of_times_covers_skewed_ones_better_than_students() -> None:
-    rng = np.random.default_rng(8)
-    covered, by_student = 0, 0
-    for x in rng.exponential(1.0, (TRIALS, 5)):
-        found, student = mean_interval(x.tolist(), "positive"), mean_interval(x.tolist())
-        covered += found.low <= 1.0 <= found.high
-        by_student += student.low <= 1.0 <= student.high
-    # 0.93 and 0.88 of 20 000 trials of the same kind.
-    assert abs(covered / TRIALS - 0.93) < TOLERANCE
-    assert covered - by_student > TOLERANCE * TRIALS
-
-
 @pytest.mark.parametrize(
     ("differences", "p"),
     [
@@ -115,16 +98,6 @@ def test_many_signs_are_drawn_and_agree_with_all_of_them() -> None:
     assert abs(found - exact) < 8 * np.sqrt(exact / 2 * (1 - exact / 2) / RANDOM_FLIPS)
     assert sign_flip_p(x)[0] == found
     assert sign_flip_p(x + 1) == (pytest.approx(2 / (1 + RANDOM_FLIPS)), 2 / (1 + RANDOM_FLIPS))
-
-
-def test_chance_is_seldom_called_a_difference() -> None:
-    rng = np.random.default_rng(6)
-    # p comes in steps of 2 / 256, of which 0.05 is none: at most 12 / 256 are below. 4 deviations of it.
-    share = 12 / 256
-    found, _ = sign_flip_p(rng.normal(0, 1, (2000, 8)))
-    assert abs(np.mean(found <= 0.05) - share) < 4 * np.sqrt(share / 2000)
-    # The planted fault: a difference of one standard deviation is found far more often.
-    assert np.mean(sign_flip_p(rng.normal(1, 1, (2000, 8)))[0] <= 0.05) > 0.5
 
 
 A, B = "depth:a", "depth:b"
@@ -187,3 +160,10 @@ def test_means_are_over_the_seeds_that_have_a_value() -> None:
     expected |= {"reliability.0.9-1.0.share": (3, 0.5), "reliability.0.9-1.0.confidence": (2, 0.94)}
     for measure, (n, mean) in expected.items():
         assert (table.at[measure, "n"], table.at[measure, "mean"]) == (n, pytest.approx(mean))
+
+
+def test_scenes_count_once_in_means_over_scenes() -> None:
+    rows = [row("cards", 1, A, 0.25), row("cards", 2, A, 0.75), row("slats", 1, A, 0.25)]
+    table = means_over_scenes(means(frame_of(rows)), {"bad_1px": "geometric"}).set_index("measure")
+    assert (table.at["bad_1px", "n"], table.at["bad_1px", "mean"]) == (2, pytest.approx(np.sqrt(0.5 * 0.25)))
+    assert table.at["seconds", "mean"] == 1.0
