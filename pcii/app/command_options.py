@@ -55,12 +55,6 @@ def dataset_at(folder: Path, budget: str | None) -> Dataset:
     return dataset if budget is None else dataset.at_budget(budget_of(budget))
 
 
-def budget_words(dataset: Dataset) -> list[str]:
-    """The option that gives the budget at which a dataset is looked at."""
-    budget = dataset.budget
-    return [] if budget is None else ["--budget", budget if isinstance(budget, str) else f"{budget:g}"]
-
-
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 ResultsOut = Annotated[Out, Parameter(help="Folder for the results: new, or with results of this dataset.")]
 DatasetFolder = Annotated[Path, Parameter(help="A dataset folder.")]

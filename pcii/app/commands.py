@@ -5,12 +5,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pcii.app.benchmark_commands import benchmark
+from pcii.app.benchmark_commands import benchmark, say_scores
 from pcii.app.command_options import Depths, Out
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
-from pcii.base.command_line import results_folder, say, say_next, say_next_page
+from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
@@ -86,10 +86,7 @@ def evaluate(
         )
     if differing := ", ".join(evaluation.origin["differing"]):
         say(f"warning: not all rows are of the same software ({differing}); name all datasets and methods")
-    for sentence in evaluation.made_again:
-        say(f"made again: {sentence}")
-    say(f"report: {out / 'evaluation.html'}")
-    say_next_page(out / "evaluation.html")
+    say_scores(out, evaluation)
 
 
 @app.command

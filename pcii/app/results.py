@@ -75,7 +75,7 @@ def run(
             save_segmented(folder, focus)
         save_depth(folder, outcome.depth)
         write_json_safely(folder / SCORE, outcome.score.to_dict())
-        write_report(folder / REPORT, outcome, report)
+        write_report(folder / REPORT, outcome)
     return outcome
 
 
