@@ -88,21 +88,6 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
 
 
-def test_run_takes_the_methods_it_is_told(
-    small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, data = tmp_path / "out", str(small_dataset)
-    methods = ["--method", "brightness", "--method", "shape-from-focus"]
-    assert "no removal named 'sharp'; use three-step" in refusal(
-        pcii_cli.app, ["run", data, "--method", "sharp", "-o", str(out)], capsys
-    )
-    assert not out.exists()
-    assert command_line.run(pcii_cli.app, ["run", data, *methods, "-o", str(out)]) == 0
-    rows = json.loads((out / "score.json").read_text())["planes"]
-    assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
-    assert "shape-from-focus" in (out / "report.html").read_text()
-
-
 def test_bad_input_to_simgen_is_refused_in_one_sentence(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -132,6 +117,8 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     assert "above 0 mm" in said
     said = refusal(pcii_cli.app, ["run", data, "--z-mm", "540", "--z-mm", "0.62", "-o", out], capsys)
     assert "z_mm: 0.62 mm is so near that no views overlap" in said
+    said = refusal(pcii_cli.app, ["run", data, "--method", "sharp", "-o", out], capsys)
+    assert "no removal named 'sharp'; use three-step" in said
     assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
     broken = tmp_path / "broken"
     shutil.copytree(small_dataset, broken)
@@ -178,18 +165,6 @@ def test_results_are_of_one_light(
     capsys.readouterr()
     assert "of another dataset or light" in refusal(pcii_cli.app, [*command, "30"], capsys)
     assert "there are 30, 120, 400" in refusal(pcii_cli.app, [*command, "31"], capsys)
-
-
-def test_a_failure_is_one_line_and_exit_code_1(
-    monkeypatch: pytest.MonkeyPatch, small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def full_disk(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("pcii.app.results.save_sections", full_disk)
-    command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
-    assert command_line.run(pcii_cli.app, command) == 1
-    assert "No space left" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("app", [simgen_cli.app, pcii_cli.app])

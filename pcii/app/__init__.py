@@ -4,8 +4,7 @@ benchmark_commands  The command `pcii benchmark`.
 command_options  Options that several commands take: folders, depths, a light, methods.
 commands         The `pcii` command.
 import_commands  The command `pcii import`: images made by others become a dataset.
-pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2
-                 and 3.
+pipeline         Analysis of a dataset, from sections to scores.
 report           report.html: pictures, scores, and how they were made.
 report_pictures  Pictures of a report: a view, sections through the depths, masks and truth, depth and error.
 report_tables    Numbers of a report as text: entropies, scores of the masks and of the depth map.

@@ -43,13 +43,10 @@ def run(
 ) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
-    OUT is an evaluation with submission.json beside it.
-
     Examples of use:
 
         pcii benchmark run three-step --data out/bench -o out/three-step
         pcii benchmark run my_method.py:remove --data out/bench --half development -o out/my-removal
-        pcii benchmark run depth:my_module:estimate --data out/bench -o out/my-depth
 
     Parameters
     ----------

@@ -3,15 +3,12 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-from cyclopts import CoercionError, Parameter
+from cyclopts import CoercionError, Parameter, Token
 
 from pcii.store.dataset import Dataset, budget_of, open_dataset
 from pcii.types.arrays import MOST_DEPTHS
-
-if TYPE_CHECKING:
-    from cyclopts import Token
 
 
 def depths_mm(text: str) -> list[float]:
@@ -39,7 +36,7 @@ def depths_mm(text: str) -> list[float]:
     )
 
 
-def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
+def _all_depths_mm(kind: Any, tokens: Sequence[Token]) -> tuple[float, ...]:
     depths: list[float] = []
     for token in tokens:
         try:
