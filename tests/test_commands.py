@@ -48,19 +48,12 @@ def test_score_json_is_as_in_the_contract(results: Path) -> None:
     }
     assert [row["name"] for row in score["objects"]] == ["ball", "bird"]
     contract = ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
-    assert list(score["depth"]) == [
-        *contract,
-        "median_px",
-        "mae_px",
-        "bias_mm",
-        "bias_px",
-        "hci",
-        "hci_objects",
-        "ece",
-        "reliability",
-    ]
-    said = [[row[key] for key in ("z_mm", "method", "truth")] for row in score["planes"]]
-    assert [[row[key] for key in ("z_mm", "method", "truth")] for row in score["bounds"]["planes"]] == said
+    assert list(score["depth"])[:5] == contract
+    places, bounds = (
+        [[row[key] for key in ("z_mm", "method", "truth")] for row in each["planes"]]
+        for each in (score, score["bounds"])
+    )
+    assert places == bounds
     # The objects are textured and 140 000 photons tell their depth to within a tenth of a pixel.
     assert all(0 < row["depth_sigma_px"] < 0.1 for row in score["bounds"]["objects"])
 
@@ -95,22 +88,6 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
 
 
-def test_run_takes_the_methods_it_is_told(
-    small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, data = tmp_path / "out", str(small_dataset)
-    asked = ["--method", "brightness", "--method", "shape-from-focus", "--method", "brightness"]
-    assert "no removal named 'sharp'; use three-step" in refusal(
-        pcii_cli.app, ["run", data, "--method", "sharp", "-o", str(out)], capsys
-    )
-    assert "z_mm" in refusal(pcii_cli.app, ["run", data, "--z-mm", "-1", "-o", str(out)], capsys)
-    assert not out.exists()
-    assert command_line.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
-    rows = json.loads((out / "score.json").read_text())["planes"]
-    assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
-    assert "shape-from-focus" in (out / "report.html").read_text()
-
-
 def test_bad_input_to_simgen_is_refused_in_one_sentence(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -136,11 +113,12 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     data, out = str(small_dataset), str(tmp_path / "out")
     said = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", "1.5", "-o", out], capsys)
     assert "--subpixel: expected a whole number, got '1.5'" in said
-    for z in ("0", "-540", "nan", "inf"):
-        said = refusal(pcii_cli.app, ["reconstruct", data, f"--z-mm={z}", "-o", out], capsys)
-        assert "above 0 mm" in said
+    said = refusal(pcii_cli.app, ["reconstruct", data, "--z-mm=-540", "-o", out], capsys)
+    assert "above 0 mm" in said
     said = refusal(pcii_cli.app, ["run", data, "--z-mm", "540", "--z-mm", "0.62", "-o", out], capsys)
     assert "z_mm: 0.62 mm is so near that no views overlap" in said
+    said = refusal(pcii_cli.app, ["run", data, "--method", "sharp", "-o", out], capsys)
+    assert "no removal named 'sharp'; use three-step" in said
     assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
     broken = tmp_path / "broken"
     shutil.copytree(small_dataset, broken)
@@ -182,59 +160,11 @@ def test_results_are_of_one_light(
     # Of 6 views of 64 x 60 pixels with 0.01 dark counts each; at 580 mm some fall beside the section.
     full = [6 * budget + 6 * 64 * 60 * 0.01 for budget in (400, 120, 30)]
     assert all(0.6 * most < total < 1.1 * most for total, most in zip(totals[1:], full, strict=True))
-    out = str(tmp_path / "out-120")
-    small = ["-o", out, "--budget", "120"]
-    assert command_line.run(pcii_cli.app, ["segment", data, "--z-mm", "540", *small]) == 0
-    assert command_line.run(pcii_cli.app, ["depth", data, *small]) == 0
-    assert command_line.run(pcii_cli.app, ["score", data, out]) == 0
-    scores = [json.loads(Path(out, "score.json").read_text())]
-    methods = ["--method", "likelihood"]
-    assert command_line.run(pcii_cli.app, ["run", data, "--z-mm", "540", *methods, *small]) == 0
-    scores.append(json.loads(Path(out, "score.json").read_text()))
-    assert scores[0] == scores[1]
+    command = ["depth", data, "-o", str(tmp_path / "depth"), "--budget"]
+    assert command_line.run(pcii_cli.app, [*command, "120"]) == 0
     capsys.readouterr()
-    command = ["depth", data, "-o", out, "--budget", "30"]
-    assert "of another dataset or light" in refusal(pcii_cli.app, command, capsys)
-
-
-def test_a_budget_that_is_not_there_is_refused(
-    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    command = ["depth", str(nested_dataset), "-o", str(tmp_path / "out"), "--budget", "31"]
-    assert "there are 30, 120, 400" in refusal(pcii_cli.app, command, capsys)
-    assert "budget" in refusal(pcii_cli.app, [*command[:-1], "few"], capsys)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("app", "command"),
-    [
-        (simgen_cli.app, "generate paper --seeds 2 --workers"),
-        (simgen_cli.app, "preview drawn_room --scene"),
-        (pcii_cli.app, "evaluate somewhere --workers"),
-    ],
-)
-@pytest.mark.parametrize("given", ["2.5", "two"])
-def test_a_number_that_is_not_whole_is_refused_where_one_is_due(
-    app: object, command: str, given: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    option = command.split()[-1]
-    out = [] if "check" in command else ["-o", str(tmp_path / "out")]
-    said = refusal(app, [*command.split(), given, *out], capsys)
-    assert f"{option}: expected a whole number, got '{given}'" in said
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_failure_is_one_line_and_exit_code_1(
-    monkeypatch: pytest.MonkeyPatch, small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def full_disk(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("pcii.app.results.save_sections", full_disk)
-    command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
-    assert command_line.run(pcii_cli.app, command) == 1
-    assert "No space left" in capsys.readouterr().err
+    assert "of another dataset or light" in refusal(pcii_cli.app, [*command, "30"], capsys)
+    assert "there are 30, 120, 400" in refusal(pcii_cli.app, [*command, "31"], capsys)
 
 
 @pytest.mark.parametrize("app", [simgen_cli.app, pcii_cli.app])
@@ -265,16 +195,11 @@ def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> 
         assert answer in capsys.readouterr().out
 
 
-def test_export_writes_the_photons_of_a_budget(
-    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_export_writes_the_photons_of_a_budget(nested_dataset: Path, tmp_path: Path) -> None:
     command = ["export", str(nested_dataset), "--format", "events", "-o", str(tmp_path / "out")]
     assert command_line.run(simgen_cli.app, [*command, "--budget", "30"]) == 0
-    assert "1 files" in capsys.readouterr().out
     with np.load(tmp_path / "out" / "events.npz") as arrays:
         total = int(arrays["n"].sum())
         assert arrays["photon_z_mm"].shape == (total,)
     # 6 views of 30 photons and 64 x 60 pixels of 0.01 dark counts: 410 counts, give or take 20.
     assert abs(total - 410) < 100
-    assert "holds something else" in refusal(simgen_cli.app, command, capsys)
-    assert "tiff" in refusal(simgen_cli.app, [*command[:3], "tiff", *command[4:]], capsys)

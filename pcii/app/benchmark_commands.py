@@ -12,7 +12,7 @@ from pcii.base.progress import Stages
 from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import open_benchmark, run_method, score_submission
 from pcii.evaluation.comparison import Evaluation
-from pcii.store.collection import IN_FRAMES, Half
+from pcii.store.collection import Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
@@ -43,14 +43,10 @@ def run(
 ) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
-    OUT is an evaluation with submission.json beside it.
-
     Examples of use:
 
         pcii benchmark run three-step --data out/bench -o out/three-step
-        pcii benchmark run depth:variance-sweep --data out/bench -o out/variance-sweep
         pcii benchmark run my_method.py:remove --data out/bench --half development -o out/my-removal
-        pcii benchmark run depth:my_module:estimate --data out/bench -o out/my-depth
 
     Parameters
     ----------
@@ -62,7 +58,7 @@ def run(
     with Stages() as report:
         opened = open_benchmark(data, half)
         evaluation = run_method(method, opened, out, budgets=budget, executor=executor, report=report)
-    _tell(out, evaluation)
+    say_scores(out, evaluation)
 
 
 @benchmark.command
@@ -87,7 +83,7 @@ def score(
         evaluation = score_submission(
             folder, open_benchmark(data, half), out, executor=executor, report=report
         )
-    _tell(out, evaluation)
+    say_scores(out, evaluation)
 
 
 @benchmark.command
@@ -106,15 +102,13 @@ def page(folder: Path, *, out: Out) -> None:
         The page to write, in a folder that exists.
     """
     count = write_page(folder, out)
-    say(f"{out}: {count} submission{'' if count == 1 else 's'}")
+    say(f"{out}: scores of {count} submission(s)")
     say_next_page(out)
 
 
-def _tell(out: Path, evaluation: Evaluation) -> None:
-    frame = evaluation.frame
-    scenes = {scene.removesuffix(IN_FRAMES) for scene in frame["scene"]}
-    datasets = frame["identity"].nunique()
+def say_scores(out: Path, evaluation: Evaluation) -> None:
+    """Say which datasets of an evaluation were scored, and why some were scored again."""
     for sentence in evaluation.made_again:
         say(f"made again: {sentence}")
-    say(f"{out}: scores of {datasets} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
+    say(f"{out / 'evaluation.html'}: scores of {evaluation.frame['identity'].nunique()} datasets")
     say_next_page(out / "evaluation.html")

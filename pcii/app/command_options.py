@@ -3,15 +3,12 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-from cyclopts import CoercionError, Parameter
+from cyclopts import CoercionError, Parameter, Token
 
 from pcii.store.dataset import Dataset, budget_of, open_dataset
 from pcii.types.arrays import MOST_DEPTHS
-
-if TYPE_CHECKING:
-    from cyclopts import Token
 
 
 def depths_mm(text: str) -> list[float]:
@@ -39,7 +36,7 @@ def depths_mm(text: str) -> list[float]:
     )
 
 
-def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
+def _all_depths_mm(kind: Any, tokens: Sequence[Token]) -> tuple[float, ...]:
     depths: list[float] = []
     for token in tokens:
         try:
@@ -53,12 +50,6 @@ def dataset_at(folder: Path, budget: str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     dataset = open_dataset(folder)
     return dataset if budget is None else dataset.at_budget(budget_of(budget))
-
-
-def budget_words(dataset: Dataset) -> list[str]:
-    """The option that gives the budget at which a dataset is looked at."""
-    budget = dataset.budget
-    return [] if budget is None else ["--budget", budget if isinstance(budget, str) else f"{budget:g}"]
 
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]

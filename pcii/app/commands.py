@@ -5,12 +5,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pcii.app.benchmark_commands import benchmark
-from pcii.app.command_options import Depths, Out
+from pcii.app.benchmark_commands import benchmark, say_scores
+from pcii.app.command_options import Out, SectionDepths
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
-from pcii.base.command_line import results_folder, say, say_next, say_next_page
+from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
@@ -51,7 +51,7 @@ def evaluate(
     out: Out,
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
-    z_mm: Depths = (),
+    z_mm: SectionDepths = (),
     executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
@@ -76,9 +76,6 @@ def evaluate(
         Default: all that can take the data.
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
-    z_mm
-        Depth of a section in mm, or start:stop:step; repeat for more. Default: those that each dataset
-        suggests.
     """
     with Stages() as report:
         evaluation = comparison.evaluate(
@@ -86,10 +83,7 @@ def evaluate(
         )
     if differing := ", ".join(evaluation.origin["differing"]):
         say(f"warning: not all rows are of the same software ({differing}); name all datasets and methods")
-    for sentence in evaluation.made_again:
-        say(f"made again: {sentence}")
-    say(f"report: {out / 'evaluation.html'}")
-    say_next_page(out / "evaluation.html")
+    say_scores(out, evaluation)
 
 
 @app.command

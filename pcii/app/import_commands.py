@@ -51,8 +51,7 @@ def import_dataset(
 ) -> None:
     """Make a dataset of images that others made: pictures, arrays, lens arrays, photon counts.
 
-    Says at which depths things are sharpest, and warns if the views fit together better in another order or
-    with a shift.
+    Says at which depths things are sharpest, and warns if the views do not fit their cameras.
 
     Examples of use:
 

@@ -5,17 +5,13 @@ script; the slider is by the one in `pcii/evaluation/templates/report.js`.
 """
 
 import json
-import shlex
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pcii.app.command_options import budget_words
 from pcii.app.pipeline import Outcome
 from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels, slider_panels
-from pcii.app.report_tables import depth_table, entropy_table, key_facts, score_table
-from pcii.base.progress import Report, silent
+from pcii.app.report_tables import depth_table, entropy_table, score_table
 from pcii.base.safe_files import write_bytes_safely
-from pcii.depth.methods import DEFAULT_METHOD
 from pcii.evaluation.method_names import NamedMethod, depth_name, software_of
 from pcii.evaluation.pages import page
 from pcii.store.software import machine
@@ -24,7 +20,7 @@ COARSE_PX = 320
 """Smaller pictures are enlarged with sharp pixels."""
 
 
-def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
+def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
     dataset, pictures = outcome.dataset, Pictures.of(outcome)
     grid = dataset.grid
@@ -34,11 +30,10 @@ def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
         "has_truth": dataset.truth is not None,
-        "facts": key_facts(outcome),
         "is_coarse": max(grid.shape_HW) < COARSE_PX,
         "smoothing_px": pictures.smoothing_px,
         "light": pictures.light,
-        "slider": slider_panels(pictures, report),
+        "slider": slider_panels(pictures),
         "input": input_panels(pictures),
         "planes": plane_panels(pictures),
         "depth": depth_panels(pictures),
@@ -60,13 +55,15 @@ def origin(outcome: Outcome) -> list[tuple[str, str]]:
         versions |= software_of(NamedMethod(method)) or {}
     seconds = ", ".join(f"{name} {value:.2f} s" for name, value in outcome.timings_s.items())
     rows = [
-        ("command", _command(outcome)),
         ("date", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
         ("machine", machine()),
         ("time", seconds),
         ("software", _versions(versions)),
+        ("methods", ", ".join(methods)),
         ("dataset", outcome.dataset.name),
     ]
+    if outcome.dataset.budget is not None:
+        rows.append(("photon budget", str(outcome.dataset.budget)))
     rows += [(key, str(manifest[key])) for key in ("origin", "licence", "citation") if manifest.get(key)]
     if manifest.get("versions"):
         rows.append(("dataset made by", _versions(manifest["versions"])))
@@ -77,15 +74,3 @@ def origin(outcome: Outcome) -> list[tuple[str, str]]:
 
 def _versions(versions: dict[str, str]) -> str:
     return ", ".join(f"{name} {number}" for name, number in versions.items())
-
-
-def _command(outcome: Outcome) -> str:
-    """The command that makes the same report, with all that it may leave out."""
-    words = ["pcii", "run", outcome.dataset.name, "-o", "RESULTS"]
-    for z in outcome.sections.z_mm:
-        words += ["--z-mm", f"{z:.17g}" if float(f"{z:g}") != z else f"{z:g}"]
-    for focus in outcome.focus:
-        words += ["--method", focus.method]
-    if outcome.depth_method != DEFAULT_METHOD:
-        words += ["--depth-method", outcome.depth_method]
-    return shlex.join([*words, *budget_words(outcome.dataset)])

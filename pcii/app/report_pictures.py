@@ -4,13 +4,11 @@ All show the whole frame, in blocks of `step_px` x `step_px` pixels if it is lar
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.base.compiled_loops import each_in_threads
-from pcii.base.progress import Report
 from pcii.figures.exposure import (
     block_px,
     encoded,
@@ -74,12 +72,6 @@ class Pictures:
         smoothing_px = smoothing_for(list(outcome.sections.counts)) if has_counts else 0.0
         return cls(outcome, block_px(outcome.dataset.grid.shape_HW, LONGEST_PX), smoothing_px)
 
-    @cached_property
-    def true_masks(self) -> np.ndarray | None:
-        """The objects that belong to each plane of the analysis, (Z, H, W) bool."""
-        truth = self.outcome.dataset.truth
-        return None if truth is None else TrueFocus(self.outcome.sections.planes, truth).by_object
-
     @property
     def light(self) -> str:
         """What sections show, in words."""
@@ -125,14 +117,13 @@ def slider_planes(outcome: Outcome) -> FocalPlanes:
     return planes.take(slice(None, None, -1))  # from near to far
 
 
-def slider_panels(pictures: Pictures, report: Report) -> list[Panel]:
+def slider_panels(pictures: Pictures) -> list[Panel]:
     """Sections through the depth range, all at one exposure; captions are depths."""
     planes, estimates = slider_planes(pictures.outcome), list[Estimate]()
     for first in range(0, len(planes), SECTIONS_AT_ONCE):
         group = planes.take(slice(first, first + SECTIONS_AT_ONCE))
         sections = reconstruct(pictures.outcome.dataset.counts_or_views, group)
         estimates += block_estimates(sections, pictures.step_px, pictures.smoothing_px)
-        report("pictures of sections", len(estimates), len(planes))
     images = each_in_threads(photo_uri, encoded(estimates))
     return [{"image": image, "caption": f"{z:.4g} mm"} for image, z in zip(images, planes.z_mm, strict=True)]
 
@@ -153,7 +144,8 @@ def input_panels(pictures: Pictures) -> list[Panel]:
 
 def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
     """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
-    outcome, middles, true = pictures.outcome, pictures.middles, pictures.true_masks
+    outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
+    true = None if truth is None else TrueFocus(outcome.sections.planes, truth).by_object  # (Z, H, W)
     images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px))
     lights = {pictures.light: images}
     if outcome.dataset.has_counts and outcome.full_light is not None:

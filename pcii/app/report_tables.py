@@ -1,10 +1,7 @@
-"""Numbers of a report as text: key facts, entropies of the objects, scores of the masks and of the depth map.
+"""Numbers of a report as text: entropies of the objects, scores of the masks and of the depth map.
 
 A column or row of which nothing is known is left out.
 """
-
-from collections.abc import Mapping
-from typing import Any
 
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
@@ -26,25 +23,6 @@ NUMBERS = {
 """Columns of the scores after those that say what is scored."""
 
 
-def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
-    """What the reader wants to know first: a few names and values."""
-    dataset, score = outcome.dataset, outcome.score
-    facts: list[tuple[str, str]] = []
-    if dataset.has_counts:
-        facts.append(("photons per view", f"{dataset.counts.total / dataset.grid.view_count:,.0f}"))
-    for focus in outcome.focus:
-        rows = [row for row in score.planes if row["method"] == focus.method and row["truth"] == "object"]
-        ious = [row["iou"] for row in rows if row["object"] is not None]
-        if ious and None not in ious:
-            facts.append((f"mean IoU of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
-    if score.depth["median_mm"] is None:
-        facts.append(("pixels with a depth", f"{(outcome.depth.confidence > 0).mean():.1%}"))
-    else:
-        facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
-        facts.append(("depths off by more than 1 px", f"{score.depth['bad_1px']:.1%}"))
-    return facts
-
-
 def entropy_table(outcome: Outcome) -> Table:
     """Entropies of the objects at each plane with their intervals (the paper's Table 1).
 
@@ -54,24 +32,19 @@ def entropy_table(outcome: Outcome) -> Table:
     half_widths: list[dict[str, float]] = []
     if objects and dataset.has_counts and dataset.truth is not None:
         half_widths = entropy_half_widths(dataset.counts, outcome.sections, dataset.truth)
-    seen = [
-        (row["name"], row["entropy"], half)
-        for row, half in zip(objects, half_widths or [{}] * len(objects), strict=True)
-        if None not in row["entropy"].values()
-    ]
-    depths = tuple(seen[0][1]) if seen else ()
-    rows = tuple(
-        (name, *(f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else "") for z, bits in entropy.items()))
-        for name, entropy, half in seen
-    )
-    best = {
-        (number, 1 + place)
-        for number, (_, entropy, _) in enumerate(seen)
-        for place, bits in enumerate(entropy.values())
-        if len(depths) > 1 and bits == min(entropy.values())
-    }
-    header = ("object", *(f"{z} mm" for z in depths))
-    return Table("Entropy of the objects, in bits", header, rows, best=frozenset(best))
+    rows: list[tuple[str, ...]] = []
+    best: set[tuple[int, int]] = set()
+    for row, half in zip(objects, half_widths or [{}] * len(objects), strict=True):
+        entropy = row["entropy"]
+        if None in entropy.values():
+            continue
+        if len(entropy) > 1:
+            lowest = min(entropy.values())
+            best |= {(len(rows), 1 + place) for place, z in enumerate(entropy) if entropy[z] == lowest}
+        cells = (f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else "") for z, bits in entropy.items())
+        rows.append((row["name"], *cells))
+    header = ("object", *(f"{z:g} mm" for z in outcome.sections.z_mm))
+    return Table("Entropy of the objects, in bits", header, tuple(rows), best=frozenset(best))
 
 
 def score_table(outcome: Outcome) -> Table:
@@ -79,32 +52,17 @@ def score_table(outcome: Outcome) -> Table:
     planes = outcome.score.planes
     oracles = outcome.score.bounds["planes"] or [{"iou_oracle": None}] * len(planes)
     rows = [{**row, "iou_oracle": bound["iou_oracle"]} for row, bound in zip(planes, oracles, strict=True)]
-    has_truth = outcome.dataset.truth is not None
-    if not has_truth:
-        rows = [row for row in rows if row["truth"] == "object"]
+    words = ["plane", "method", "truth", "objects"]
+    if outcome.dataset.truth is None:
+        words, rows = words[:2], [row for row in rows if row["truth"] == "object"]
     numbers = [key for key in NUMBERS if any(row[key] is not None for row in rows)]
-    header = (
-        "plane",
-        "method",
-        *(("truth", "objects") if has_truth else ()),
-        *(NUMBERS[key] for key in numbers),
-    )
-    cells = [
-        (
-            f"{row['z_mm']:g} mm",
-            row["method"],
-            *((row["truth"], _objects(row)) if has_truth else ()),
-            *("–" if row[key] is None else f"{row[key]:.3f}" for key in numbers),
-        )
-        for row in rows
-    ]
-    return Table("Scores of the masks", header, tuple(cells), words=4 if has_truth else 2)
-
-
-def _objects(row: Mapping[str, Any]) -> str:
-    if row["truth"] == "pixel":
-        return "all in focus"
-    return row["object"] or "none at this plane"
+    cells: list[tuple[str, ...]] = []
+    for row in rows:
+        objects = "all in focus" if row["truth"] == "pixel" else row["object"] or "none at this plane"
+        texts = [f"{row['z_mm']:g} mm", row["method"], row["truth"], objects][: len(words)]
+        cells.append((*texts, *("–" if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
+    header = (*words, *(NUMBERS[key] for key in numbers))
+    return Table("Scores of the masks", header, tuple(cells), words=len(words))
 
 
 def depth_table(outcome: Outcome) -> Table:

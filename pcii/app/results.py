@@ -75,7 +75,7 @@ def run(
             save_segmented(folder, focus)
         save_depth(folder, outcome.depth)
         write_json_safely(folder / SCORE, outcome.score.to_dict())
-        write_report(folder / REPORT, outcome, report)
+        write_report(folder / REPORT, outcome)
     return outcome
 
 
@@ -196,6 +196,5 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
         segmented.append(Segmented(arrays["in_focus"], method, sections[planes], photon_in_focus=photons))
     depth = DepthMap(**read(DEPTH, DEPTH_LABELS)) if lists_part(files, DEPTH) else None
     if not segmented and depth is None:
-        steps = "`pcii segment`, `pcii depth` or `pcii run`"
-        raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with {steps}")
+        raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with `pcii run`")
     return segmented, depth

@@ -11,12 +11,11 @@ from pcii.app.command_options import (
     DepthRange,
     ResultsOut,
     SectionDepths,
-    budget_words,
     dataset_at,
 )
 from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
-from pcii.base.command_line import say, say_next, say_next_page
+from pcii.base.command_line import say, say_next_page
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
@@ -25,7 +24,7 @@ from pcii.figures.pictures import depth_image, mask_image, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
 from pcii.sections.reconstruction import reconstruct as reconstruct_sections
-from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset import open_dataset
 from pcii.store.folders import read_results
 from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, planes_of
@@ -53,8 +52,7 @@ def run(
     Examples of use:
 
         pcii run out/paper -o out/paper-results
-        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood
-        pcii run out/paper -o out/full-light --budget full-light --z-range-mm 450 750
+        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood --z-range-mm 450 750
 
     Parameters
     ----------
@@ -88,9 +86,8 @@ def reconstruct(
 ) -> None:
     """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
 
-    Examples of use:
+    Example of use:
 
-        pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
         pcii reconstruct out/paper --z-mm 500:700:20 -o out/sections
 
     Parameters
@@ -124,9 +121,8 @@ def depth(
 ) -> None:
     """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
-    Examples of use:
+    Example of use:
 
-        pcii depth out/paper -o out/depth
         pcii depth out/paper --method focus --z-range-mm 450 750 -o out/depth
 
     Parameters
@@ -157,9 +153,8 @@ def segment(
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
 
-    Examples of use:
+    Example of use:
 
-        pcii segment out/paper --z-mm 540 -o out/removed
         pcii segment out/paper --z-mm 540 --method three-step -o out/removed
 
     Parameters
@@ -176,15 +171,14 @@ def segment(
         results.save_segmented(folder, focus)
         for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
             write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
-    for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
-        say(f"{z:g} mm: {mask.mean():.2%} of the section in focus")
-    _say_next_score(data, out)
+    shares = zip(focus.z_mm, focus.in_focus.mean(axis=(1, 2)), strict=True)
+    say(f"{out}: in focus are " + ", ".join(f"{share:.2%} at {z:g} mm" for z, share in shares))
 
 
 def score(dataset: DatasetFolder, out: Path) -> None:
     """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
-    Examples of use:
+    Example of use:
 
         pcii score out/paper out/paper-results
 

@@ -9,8 +9,6 @@ import pytest
 
 from pcii.app.commands import app
 from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.removal.methods import segment
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.verification import verify
 from pcii.types.camera_grid import CameraGrid
@@ -72,21 +70,6 @@ def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
     save_dataset(tmp_path / "d", Views(LIGHT, GRID), z_mm=500)
     assert run(command[0], tmp_path / "d", "-o", tmp_path / "out", *command[1:]) == 2
     assert "no photon counts; import the images with --photons N" in capsys.readouterr().err
-
-
-def test_methods_for_photon_counts_say_what_to_do_with_images() -> None:
-    views = Views(LIGHT, GRID)
-    with pytest.raises(InputError, match=r"expected PhotonCounts .*of Views pcii\.limit_photons"):
-        segment(views, 500)  # type: ignore[arg-type]
-
-
-def test_results_of_one_strangers_dataset_are_not_taken_for_anothers(tmp_path: Path, capsys) -> None:
-    save_dataset(tmp_path / "a", Views(LIGHT, GRID), z_mm=500)
-    save_dataset(tmp_path / "b" / "a", Views(2 * LIGHT, GRID), z_mm=500)
-    assert run("depth", tmp_path / "a", "-o", tmp_path / "out") == 0
-    for command in (["run", tmp_path / "b" / "a", "-o"], ["score", tmp_path / "b" / "a"]):
-        assert run(*command, tmp_path / "out") == 2
-        assert "the results of another dataset" in capsys.readouterr().err
 
 
 def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsys) -> None:
