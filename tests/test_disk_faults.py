@@ -30,7 +30,7 @@ Content = dict[Any, Any]
 
 
 class Work(NamedTuple):
-    """Commands that fill a folder: what is there before, the one whose disk fails, and what is compared."""
+    """Commands that fill a folder: those before, the one whose disk fails, and what is compared."""
 
     package: str
     before: list[list[str]]
@@ -89,14 +89,10 @@ class Folders:
 
     def before(self, name: str, out: Path) -> Content:
         """Fill `out` with what is there before, if anything is; its content."""
-        work, start = self.works[name], self.root / f"{name}-before"
-        if not work.before:
-            return {}
-        if not start.exists():
-            for command in work.before:
-                assert work.here(start, command) == 0
-        shutil.copytree(start, out)
-        return work.content(out)
+        work = self.works[name]
+        for command in work.before:
+            assert work.here(out, command) == 0
+        return work.content(out) if work.before else {}
 
     def after(self, name: str) -> Content:
         """Content of what the work leaves."""
@@ -107,24 +103,13 @@ class Folders:
         return self.works[name].content(whole)
 
 
-@pytest.fixture(scope="module")
-def folders(works: dict[str, Work], tmp_path_factory: pytest.TempPathFactory) -> Folders:
-    return Folders(works, tmp_path_factory.mktemp("folders"))
-
-
 def check_failure(code: int, error: str, out: Path) -> None:
-    """The exit code tells of a failure, and the last lines are sentences that name the folder.
-
-    Of a collection there can be one for each dataset that was not made, else there is one.
-    """
+    """The exit code tells of a failure, and the last lines are sentences that name the folder."""
     assert code in (1, 2), error
     assert "Traceback" not in error
-    lines = error.rstrip().splitlines()
-    errors = [line for line in lines if line.startswith(("error: ", "not made: "))]
-    assert errors, error
-    assert errors == lines[-len(errors) :], error
-    assert len(errors) == 1 or all(line.startswith("not made: ") for line in errors), error
-    assert all(out.name in line for line in errors), error  # or a temporary file beside it
+    *_, last = error.rstrip().splitlines()
+    assert last.startswith(("error: ", "not made: ")), error  # of a collection, one for each dataset
+    assert out.name in last, error  # or a temporary file beside it
 
 
 def check_after_all(folders: Folders, name: str, out: Path, before: Content) -> None:
