@@ -89,10 +89,14 @@ class Folders:
 
     def before(self, name: str, out: Path) -> Content:
         """Fill `out` with what is there before, if anything is; its content."""
-        work = self.works[name]
-        for command in work.before:
-            assert work.here(out, command) == 0
-        return work.content(out) if work.before else {}
+        work, start = self.works[name], self.root / f"{name}-before"
+        if not work.before:
+            return {}
+        if not start.exists():
+            for command in work.before:
+                assert work.here(start, command) == 0
+        shutil.copytree(start, out)
+        return work.content(out)
 
     def after(self, name: str) -> Content:
         """Content of what the work leaves."""
@@ -101,6 +105,11 @@ class Folders:
             self.before(name, whole)
             assert self.works[name].here(whole) == 0
         return self.works[name].content(whole)
+
+
+@pytest.fixture(scope="module")
+def folders(works: dict[str, Work], tmp_path_factory: pytest.TempPathFactory) -> Folders:
+    return Folders(works, tmp_path_factory.mktemp("folders"))
 
 
 def check_failure(code: int, error: str, out: Path) -> None:
