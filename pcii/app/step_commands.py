@@ -15,7 +15,7 @@ from pcii.app.command_options import (
 )
 from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
-from pcii.base.command_line import say, say_next_page
+from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
@@ -24,7 +24,7 @@ from pcii.figures.pictures import depth_image, mask_image, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
 from pcii.sections.reconstruction import reconstruct as reconstruct_sections
-from pcii.store.dataset import open_dataset
+from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
 from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, planes_of
@@ -108,7 +108,7 @@ def reconstruct(
         say(f"{saturated} of {sections.counts.size} voxels are saturated: their estimate is infinite")
     if data.has_counts:
         depths = (f"--z-mm={z:g}" for z in z_mm)
-        say_next("pcii", "segment", dataset, *depths, "-o", out, *budget_words(data))
+        say_next("pcii", "segment", dataset, *depths, "-o", out, *(["--budget", budget] if budget else []))
 
 
 def depth(

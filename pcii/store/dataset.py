@@ -170,8 +170,8 @@ class Dataset(ShortForm):
         part = self._counts_name
         if part is None or not self.has_counts:
             raise InputError(
-                f"{self.path}: there are no photon counts in this light; import the images with --photons N, "
-                "or generate the dataset with products.counts = true"
+                f"{self.path}: this light has no photon counts; import the images with --photons N, or "
+                "generate the dataset with products.counts = true"
             )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         if self.has(f"{part}/{FRAME}"):

@@ -126,8 +126,8 @@ def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) ->
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
     """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
     parts = images if isinstance(images, tuple | list) else [images]
-    by_kind = {type(part): part for part in parts}
-    counts, views = by_kind.get(PhotonCounts), by_kind.get(Views)
+    counts = next((part for part in parts if isinstance(part, PhotonCounts)), None)
+    views = next((part for part in parts if isinstance(part, Views)), None)
     if not parts or (counts is not None) + (views is not None) != len(parts):
         kinds = ", ".join(type(part).__name__ for part in parts) or "nothing"
         raise InputError(f"images: expected PhotonCounts, Views, or one of each, got {kinds}")

@@ -18,7 +18,8 @@ def planes_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> FocalPla
     """
     depths = z_mm or dataset.analysis.get("z_mm")
     if not depths:
-        raise InputError(f"{dataset.path}: suggests no depths; name them with --z-mm or --z-range-mm")
+        advice = "name depths with --z-mm, or a range with --z-range-mm"
+        raise InputError(f"{dataset.path}: suggests no depths; {advice}")
     planes = FocalPlanes.at_depths(dataset.grid, depths)
     _check_overlap(dataset.grid, planes.z_mm, "z_mm")
     return planes

@@ -78,7 +78,7 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert run("segment", tmp_path / "d", "-o", out) == 2
     assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
     assert run("depth", tmp_path / "d", "-o", out) == 2
-    assert "name one with --z-range-mm" in capsys.readouterr().err
+    assert "or a range with --z-range-mm" in capsys.readouterr().err
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 450, 700) == 0
     assert "depth.png: 450 mm is yellow, 700 mm violet" in capsys.readouterr().out
     command = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, "--z-mm", 600]

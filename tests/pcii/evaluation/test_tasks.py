@@ -97,7 +97,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
     capsys.readouterr()
     assert command_line.run(cli.app, ["segment", *at_light, "-o", str(tmp_path / "no")]) == 2
-    assert "full-light is the radiance, and this needs photon counts" in capsys.readouterr().err
+    assert "this light has no photon counts" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

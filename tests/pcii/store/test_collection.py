@@ -33,10 +33,8 @@ def folder(tmp_path: Path) -> Path:
     rows = []
     for number in range(20):
         for seed in (1, 2):
-            name, values = (
-                f"scene_{number}_seed_{seed}",
-                {"scene_number": number, "photons.budget": 100, "seed": seed},
-            )
+            name = f"scene_{number}_seed_{seed}"
+            values = {"scene_number": number, "photons.budget": 100, "seed": seed}
             (root / name).mkdir()
             recipe = {"scene": "drawn", "scene_number": number, "seed": seed, "photons": {"budget": 100}}
             manifest = {"grid": GRID, "cfa": None, "files": {}, "recipe": recipe, "identity": name}
@@ -52,17 +50,15 @@ def collection(folder: Path) -> Collection:
     return open_collection(folder)
 
 
-def test_datasets_are_opened_in_the_order_of_the_index(collection: Collection) -> None:
+def test_numbers_slices_and_masks_select_datasets(collection: Collection) -> None:
     assert len(collection) == 40
-    assert collection[3].path.name == "scene_1_seed_2"
-    assert collection[-1].path.name == "scene_19_seed_2"
-    assert [dataset.path.name for dataset in collection[:2]] == ["scene_0_seed_1", "scene_0_seed_2"]
     assert "40" in repr(collection)
-
-
-def test_slices_and_masks_select_datasets(collection: Collection) -> None:
+    assert [collection[number].path.name for number in (3, -1)] == ["scene_1_seed_2", "scene_19_seed_2"]
+    assert [dataset.path.name for dataset in collection[:2]] == ["scene_0_seed_1", "scene_0_seed_2"]
     table = collection.table()
-    assert len(collection[table["seed"] == 2]) == 20
+    names = ["path", "scene", "scene_number", "seed", "split", "photons", "photons.budget"]
+    assert list(table.columns) == names
+    assert table["seed"].tolist() == 20 * [1, 2]
     (row,) = collection[(table["scene_number"] == 7) & (table["seed"] == 1)].rows
     assert row["path"] == "scene_7_seed_1"
     for mask in ([True], [0.5] * 40, "train"):
@@ -78,44 +74,27 @@ def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None
     assert list(shares) == [800, 100, 100]
 
 
-def test_the_table_has_a_column_for_each_field(collection: Collection) -> None:
-    table = collection.table()
-    names = ["path", "scene", "scene_number", "seed", "split", "photons", "photons.budget"]
-    assert list(table.columns) == names
-    assert table["seed"].tolist() == 20 * [1, 2]
-
-
 def forge_a_path(folder: Path) -> None:
     rows = [json.loads(line) for line in (folder / INDEX).read_text().splitlines()[:-1]]
     rows[0]["path"] = "../elsewhere"
     write_index(folder, rows)
 
 
-def forge_the_fields(folder: Path) -> None:
-    COLLECTION_FOLDER.write(folder, {"fields": 3})
-
-
-def exchange_manifests(folder: Path) -> None:
-    shutil.copy(folder / "scene_5_seed_1" / MANIFEST, folder / "scene_4_seed_1" / MANIFEST)
-
-
-def lose_a_dataset(folder: Path) -> None:
-    shutil.rmtree(folder / "scene_4_seed_1")
-
-
 @pytest.mark.parametrize(
     ("harm", "words"),
     [
         (forge_a_path, "not of a dataset in this folder"),
-        (forge_the_fields, "fields: "),
-        (exchange_manifests, r"is not the one that index\.jsonl lists"),
-        (lose_a_dataset, "missing or unfinished"),
+        (lambda path: COLLECTION_FOLDER.write(path, {"fields": 3}), "fields: "),
+        (
+            lambda path: shutil.copy(path / "scene_5_seed_1" / MANIFEST, path / "scene_4_seed_1"),
+            "not the one that",
+        ),
+        (lambda path: shutil.rmtree(path / "scene_4_seed_1"), "missing or unfinished"),
     ],
 )
 def test_what_no_checksum_of_a_file_tells_is_refused(
     folder: Path, harm: Callable[[Path], None], words: str
 ) -> None:
-    """Other damage is in test_verification.py."""
     harm(folder)
     for each in (verify, lambda path: open_collection(path)[8]):
         with pytest.raises(InputError, match=words):

@@ -20,7 +20,7 @@ from stored_datasets import (
 import pcii
 from pcii.app import commands
 from pcii.base import command_line
-from pcii.store.dataset import SAMPLE, Dataset, open_dataset
+from pcii.store.dataset import SAMPLE, open_dataset
 from pcii.store.dataset_layout import (
     COUNTS,
     MANIFEST,
@@ -54,19 +54,14 @@ def test_a_dataset_is_read_as_it_was_written(tmp_path, sparse):
     np.testing.assert_array_equal(dataset.views.view(1, 2), np.full((4, 5, 3), 5.0))
 
 
-def test_what_a_dataset_does_not_have_is_none_or_refused(tmp_path):
-    root = make_dataset(tmp_path / "d", files={})
+def test_what_a_dataset_does_not_have_is_none_or_refused_and_other_members_are_kept(tmp_path):
+    root = make_dataset(tmp_path / "d", files={}, mine={"a": [1]})
     dataset = open_dataset(root)
     assert dataset.truth is None
     assert dataset.views is None
     assert "no photon counts" in one_sentence(lambda: dataset.counts, root)
     assert "no photons of budget 3" in one_sentence(lambda: dataset.at_budget(3), root)
-
-
-def test_members_that_the_model_does_not_name_are_kept(tmp_path):
-    manifest = open_dataset(make_dataset(tmp_path / "d", mine={"a": [1]})).manifest
-    assert manifest["mine"] == {"a": [1]}
-    assert manifest.title == manifest["title"] == "by hand"
+    assert dataset.manifest["mine"] == {"a": [1]}
 
 
 @pytest.mark.parametrize(
@@ -87,30 +82,21 @@ def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, spar
 # Damage
 
 
-def cut(file):
-    file.write_bytes(file.read_bytes()[:-1])
-
-
-@pytest.mark.parametrize("part", [COUNTS, RADIANCE])
-@pytest.mark.parametrize(("damage", "words"), [(cut, "truncated"), (Path.unlink, "missing")])
-def test_a_file_that_is_cut_or_lost_is_found_on_opening(tmp_path, part, damage, words):
-    root = make_dataset(tmp_path / "d")
-    file = largest_file(root, part)
-    damage(file)  # a deleted Zarr chunk would read as zeros
-    assert words in one_sentence(lambda: open_dataset(root), file)
-
-
 @pytest.mark.parametrize(
     ("part", "read"),
     [(COUNTS, lambda d: d.counts), (TRUTH, lambda d: d.truth), (RADIANCE, lambda d: d.views.view(1, 2))],
 )
-def test_a_flipped_bit_is_found_on_reading_and_leaves_other_parts_readable(tmp_path, part, read):
+def test_damage_is_found_on_opening_or_on_reading_and_leaves_other_parts_readable(tmp_path, part, read):
     root = make_dataset(tmp_path / "d")
     file = root / radiance_name(1, 2) if part == RADIANCE else largest_file(root, part)
     flip_a_bit(file, 1234)
     dataset = open_dataset(root)
     assert "SHA-256" in one_sentence(lambda: read(dataset), file)
     assert part == COUNTS or dataset.counts.total == DENSE.sum()
+    file.write_bytes(file.read_bytes()[:-1])
+    assert "truncated" in one_sentence(lambda: open_dataset(root), file)
+    file.unlink()  # a deleted Zarr chunk would read as zeros
+    assert "missing" in one_sentence(lambda: open_dataset(root), file)
 
 
 # Manifests
@@ -118,12 +104,8 @@ def test_a_flipped_bit_is_found_on_reading_and_leaves_other_parts_readable(tmp_p
 ENTRY = {"bytes": 1, "sha256": "0" * 64}
 WRONG = [
     ({"cfa": "GRGB"}, "cfa: "),
-    ({"grid": {"rows": 1}}, "grid: "),
-    ({"objects": {"1": 3}}, "objects.1: "),
     ({"analysis": {"z_mm": [-5.0]}}, "analysis.z_mm.0: "),
     ({"recipe": {"photons": {"nested": ["few"]}}}, "recipe.photons.nested.0: "),
-    ({"radiance_channels": 2}, "radiance_channels: "),
-    ({"title": ["a"]}, "title: "),
     ({"files": ...}, "files: "),
     ({"files": {"../secret": ENTRY}}, "a path inside the folder"),
     ({"files": {"a": ENTRY | {"sha256": "no"}}}, "files.a.sha256: "),
@@ -140,13 +122,11 @@ def test_a_wrong_or_absent_member_of_a_manifest_is_named(tmp_path, members, word
 # Radiance
 
 
-def test_radiance_of_unknown_channels_or_another_size_is_refused(tmp_path):
-    root = make_dataset(tmp_path / "d", radiance_channels=None)
-    unknown = open_dataset(root)
-    assert "radiance_channels: missing" in one_sentence(lambda: unknown.views, root / MANIFEST)
+def test_radiance_of_another_size_is_refused(tmp_path):
+    root = make_dataset(tmp_path / "d")
     wrong = root / radiance_name(1, 2)
     write_exr_safely(wrong, np.zeros((40, 50, 3), dtype=np.float32))
-    rewrite_manifest(root, radiance_channels=3, files=list_files(root, [COUNTS, TRUTH, RADIANCE]))
+    rewrite_manifest(root, files=list_files(root, [COUNTS, TRUTH, RADIANCE]))
     views = open_dataset(root).views
     assert views is not None
     assert "expected an image (4, 5, 3)" in one_sentence(lambda: views.view(1, 2), wrong)
@@ -162,26 +142,21 @@ def test_radiance_is_read_view_by_view_or_by_numpy(tmp_path):
         np.testing.assert_array_equal(whole, expected)
     with pytest.raises(ValueError, match="only a copy"):
         np.asarray(views.radiance, copy=False)
-    for index in (0, (0, 1, 2), (2, 0), (0, -1), (slice(None), 0), ..., (0, 0.5)):
+    for index in (0, (2, 0), (0, -1), (slice(None), 0)):
         with pytest.raises(pcii.InputError, match=r"radiance: read one of 2 x 3 views by \[k, l\]"):
             views.radiance[index]  # type: ignore[index]
 
 
-@pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize("size", [(1, 1), (3, 7)])
-def test_radiance_comes_back_in_its_channels_and_in_single_precision(tmp_path, channels, size):
-    image = np.random.default_rng(0).random((*size, channels)).astype(np.float32)
+@pytest.mark.parametrize("shape", [(1, 1, 1), (3, 7, 3)])
+def test_radiance_comes_back_in_its_channels_and_in_single_precision(tmp_path, shape):
+    path, image = tmp_path / "a.exr", np.random.default_rng(0).random(shape).astype(np.float32)
     image[0, 0, 0] = 1e6  # beyond half precision
-    write_exr_safely(tmp_path / "a.exr", image)
-    again = read_exr(tmp_path / "a.exr")
+    write_exr_safely(path, image)
+    again = read_exr(path)
     assert again.dtype == np.float32
     np.testing.assert_array_equal(again, image)
-
-
-@pytest.mark.parametrize("content", [b"", b"not an image", b"v/1\x01" + bytes(50)])
-def test_what_is_no_exr_is_refused(tmp_path, content):
-    (tmp_path / "a.exr").write_bytes(content)
-    assert "cannot be read" in one_sentence(lambda: read_exr(tmp_path / "a.exr"), tmp_path / "a.exr")
+    path.write_bytes(b"v/1\x01" + bytes(50))
+    assert "cannot be read" in one_sentence(lambda: read_exr(path), path)
 
 
 # The sample
@@ -219,8 +194,8 @@ def test_the_sample_is_what_its_recipe_gives(tmp_path: Path) -> None:
     assert sample.manifest["scene"] == again.manifest["scene"]
     if again.manifest.files == sample.manifest.files:
         return
-    # Another renderer, or another processor: the same geometry but for pixels on an outline, the same light
-    # but for its noise, and other photons of the same rate.
+    # Another renderer or processor: the same geometry but for pixels on an outline, and other photons of the
+    # same rate.
     assert again.truth is not None
     assert sample.truth is not None
     same = again.truth.object_id == sample.truth.object_id
@@ -229,9 +204,3 @@ def test_the_sample_is_what_its_recipe_gives(tmp_path: Path) -> None:
     for k, l in np.ndindex(5, 5):
         totals = [int(data.counts.view(k, l).sum()) for data in (again, sample)]
         assert abs(totals[0] - totals[1]) < 5 * np.sqrt(2 * 2000)
-
-    def mean_light(data: Dataset) -> float:
-        assert data.views is not None
-        return float(data.views.view(2, 2).mean(dtype=float))
-
-    assert mean_light(again) == pytest.approx(mean_light(sample), rel=0.02)

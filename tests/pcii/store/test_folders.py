@@ -52,15 +52,6 @@ def test_what_else_there_is_is_refused(kind: FolderKind, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_a_document_comes_back_with_members_that_no_model_names(kind: FolderKind, tmp_path: Path) -> None:
-    kind.write(tmp_path, {"ångström": [1, 2.5, None]})
-    document = kind.read(tmp_path, Manifest)
-    assert document["ångström"] == document.get("ångström") == [1, 2.5, None]
-    assert document.get("absent", 3) == 3
-    with pytest.raises(KeyError):
-        document["absent"]
-
-
 def test_a_document_that_is_missing_or_of_others_is_refused(kind: FolderKind, tmp_path: Path) -> None:
     path, nowhere = tmp_path / kind.document, tmp_path / "nowhere"
     assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere, Manifest), nowhere)

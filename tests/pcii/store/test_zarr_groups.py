@@ -44,14 +44,6 @@ def test_arrays_of_any_shape_come_back_to_the_bit(tmp_path, array):
     assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
 
 
-def test_an_array_says_what_it_is(tmp_path):
-    write_arrays_safely(tmp_path / "a.zarr", {"y": np.arange(3)}, {"y": Y})
-    stored = zarr.open_array(tmp_path / "a.zarr" / "y", mode="r")
-    assert stored.metadata.dimension_names == ("step",)  # type: ignore[union-attr]
-    conventional = {"units": "mm", "long_name": "three numbers"}
-    assert dict(stored.attrs) == {"unit": "mm", "meaning": "three numbers"} | conventional
-
-
 @given(st.lists(st.integers(0, 3000), max_size=5).map(tuple))
 @at_least(200)
 def test_chunks_fit_the_array_and_the_limit(shape):
@@ -59,10 +51,6 @@ def test_chunks_fit_the_array_and_the_limit(shape):
     assert len(chunks) == len(shape)
     assert all(1 <= chunk <= max(size, 1) for chunk, size in zip(chunks, shape, strict=True))
     assert np.prod(chunks, dtype=object) <= CHUNK_ELEMENTS
-
-
-def test_one_view_of_the_paper_is_one_chunk():
-    assert chunk_shape((10, 10, 1024, 1024)) == (1, 1, 1024, 1024)
 
 
 # Arrays of strangers
@@ -80,10 +68,13 @@ def stored(tmp_path):
     return tmp_path / "a.zarr" / "x", read
 
 
-def test_chunks_of_zeros_are_there_and_none_may_lack(stored):
+def test_chunks_of_zeros_are_there_and_none_may_lack_or_be_damaged(stored):
     path, read = stored
     np.testing.assert_array_equal(read(row=3, col=4), np.zeros((3, 4)))
-    next(file for file in (path / "c").rglob("*") if file.is_file()).unlink()
+    chunk = next(file for file in (path / "c").rglob("*") if file.is_file())
+    flip_a_bit(chunk, 70)
+    assert "cannot be read" in one_sentence(read, path)
+    chunk.unlink()
     assert "expected 1 chunks, the manifest lists 0" in one_sentence(read, path)
 
 
@@ -95,15 +86,10 @@ def test_a_shape_that_the_camera_grid_does_not_have_is_refused(stored):
 CHANGES = [
     {"shape": [200_000_000, 4]},
     {"shape": [3]},
-    {"shape": "34"},
     {"data_type": "object"},
-    {"data_type": "complex128"},
     {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [1 << 30, 1]}}},
     {"codecs": [{"name": "numcodecs.pickle"}]},
-    {"codecs": 3},
     {"node_type": "group"},
-    {"zarr_format": 2},
-    {"fill_value": {"a": 1}},
 ]
 
 
@@ -112,11 +98,4 @@ def test_metadata_that_are_not_ours_are_refused_in_one_sentence(stored, change):
     path, read = stored
     metadata = json.loads((path / METADATA).read_text())
     (path / METADATA).write_text(json.dumps(metadata | change))
-    assert "cannot be read" in one_sentence(read, path)
-
-
-def test_a_chunk_that_is_damaged_is_refused(stored):
-    path, read = stored
-    chunk = next(file for file in (path / "c").rglob("*") if file.is_file())
-    flip_a_bit(chunk, 70)
     assert "cannot be read" in one_sentence(read, path)
