@@ -173,6 +173,7 @@ def segment(
             write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
     shares = zip(focus.z_mm, focus.in_focus.mean(axis=(1, 2)), strict=True)
     say(f"{out}: in focus are " + ", ".join(f"{share:.2%} at {z:g} mm" for z, share in shares))
+    _say_next_score(data, out)
 
 
 def score(dataset: DatasetFolder, out: Path) -> None:
