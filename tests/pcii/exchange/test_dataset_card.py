@@ -1,7 +1,6 @@
 """Cards: short, true to the data, the same every time, harmless, and no part of the data."""
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -68,28 +67,14 @@ def test_a_card_follows_the_data_and_the_terms_alone(tmp_path):
     assert (root / CARD).read_text() == "# My own words"
 
 
-class Shown(HTMLParser):
-    """Elements of a page, and where its links lead."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.tags, self.links = set[str](), list[str]()
-        self.feed(page)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-        self.links += [value for _, value in attrs]
-
-
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_names_with_markup_appear_as_plain_text_in_cards(tmp_path, name):
     root = make_dataset(tmp_path / "data", title=name, objects={"1": name}, recipe={"scene": name})
     for address in (name, f"https://example.org/{name}", f"javascript://{name}"):
         write_card(root, Terms(address, (name,), name, address))
-        text = (root / CARD).read_text()
-        page = Shown(MarkdownIt("gfm-like", {"html": True, "linkify": False}).render(text))
-        assert page.tags <= {"h1", "p", "code", "pre", "a", "blockquote"}
-        assert all(str(link).startswith(("https://", "language-")) for link in page.links)
+        page = MarkdownIt("gfm-like", {"html": True, "linkify": False}).render((root / CARD).read_text())
+        assert {*re.findall(r"<(\w+)", page)} <= {"h1", "p", "code", "pre", "a", "blockquote"}
+        assert all(link.startswith("https://") for link in re.findall('href="([^"]*)', page))
 
 
 def test_the_default_terms_are_those_of_the_project():

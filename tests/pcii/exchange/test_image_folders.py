@@ -10,7 +10,7 @@ import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
 
-from pcii import ViewOrder, import_images
+from pcii import import_images
 from pcii.base.srgb import srgb_to_linear
 
 PATTERN = "{col}_{row}.%s"
@@ -139,12 +139,3 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     for profile in ("srgb", "other"):
         import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
     assert [one for one in told if "profile" in one] == ["not used: the colour profile in 0_0.other.png"]
-
-
-def test_numbers_that_count_the_other_way(tmp_path: Path) -> None:
-    for k, l in np.ndindex(2, 3):
-        write(tmp_path / f"{2 * (2 - l) + (1 - k)}.png", numbers(k, l))  # from the right, up the columns
-    order = ViewOrder(swap_axes=True, flip_rows=True, flip_cols=True)
-    views = import_images(tmp_path, "{index}.png", OPTICS, grid=(2, 3), order=order, encoding="linear")
-    for k, l in np.ndindex(2, 3):
-        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))

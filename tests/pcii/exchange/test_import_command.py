@@ -97,14 +97,6 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
 
 
-def test_a_stage_that_moves_to_and_fro(photos: Path, tmp_path: Path, capsys) -> None:
-    to_and_fro = [(k, 2 - l if k % 2 else l) for k, l in np.ndindex(3, 3)]
-    assert run(*pages(photos, tmp_path / "mine", to_and_fro), "--serpentine") == 0
-    said = capsys.readouterr().out
-    assert "warning" not in said
-    assert "sharpest at 5" in said
-
-
 def test_views_that_fit_in_no_order_have_a_next_step(photos: Path, tmp_path: Path, capsys) -> None:
     shuffled = [divmod(n, 3) for n in (3, 7, 2, 0, 6, 8, 5, 1, 4)]
     assert run(*pages(photos, tmp_path / "mine", shuffled)) == 0
