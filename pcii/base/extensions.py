@@ -46,7 +46,7 @@ class MethodRegistry:
         Raises `InputError`, which lists the known names, if there is no such `noun` among those `offered`.
         """
         known = self.built_in if offered is None else offered
-        if isinstance(method, str) and ":" in method:
+        if isinstance(method, str) and ":" in method and method not in known:
             method = load_function(method)
         if callable(method):
             return self.checked(method, f"method: {name_of(method)!r}", None)
