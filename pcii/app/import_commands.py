@@ -65,7 +65,7 @@ def import_dataset(
     ----------
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
-        benchmark, pictures with a transforms.json, a picture of a lens array, an array in a
+        benchmark, pictures or photon cubes with a transforms.json, a picture of a lens array, an array in a
         .npy file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
     out
         Folder for the dataset: new or empty.

@@ -18,6 +18,7 @@ from pcii.exchange.image_folders import VIEWS, files_by_camera, is_picture, page
 from pcii.exchange.pixel_files import Encoding, decode, picture_of, to_radiance
 from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
 from pcii.types.arrays import whole_counts
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -27,6 +28,11 @@ MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
 FRAMES_AT_ONCE = 255
 """Their sum fits in a byte."""
+MIN_COLUMN_MEAN = 10
+"""Mean number of counts of a column from which a column without any is warned of; by chance it is one in
+e^10. If it is smaller, dim captures are warned of without a reason."""
+MIN_JUDGED_BYTES = 100
+"""Number of bytes above 0 from which they are tested for packed bits. If it is smaller, chance decides."""
 
 
 def import_arrays(
@@ -70,7 +76,7 @@ def import_arrays(
 
 def import_counts(
     source: str | Path | np.ndarray,
-    optics: Optics,
+    optics: Optics | CameraGrid,
     *,
     pattern: str | None = None,
     grid: tuple[int, int] | None = None,
@@ -84,14 +90,15 @@ def import_counts(
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
+    An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
     A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file of N
     frames (N, H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
     `import_images`. An array, or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W);
     with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W). With `bitpack` arrays have frames of bits, eight
     pixels in a byte, whose rows are `width` pixels wide, by default all bits. `frames` are the first and the
     last to add up, from 0. The frame of each single count of bits and of arrays of bool is kept, up to 2^24
-    counts. `tell` takes sentences on what is left out. Raises `InputError` for counts that are negative or
-    fractional in any frame.
+    counts. `tell` takes sentences on what is left out or looks wrong. Raises `InputError` for counts that are
+    negative or fractional in any frame.
     """
     if width is not None and not bitpack:
         raise InputError("--width: is for packed frames; give --bitpack too")
@@ -114,7 +121,11 @@ def import_counts(
         )
     if bitpack:
         row = width or 8 * row
-    camera_grid = optics.grid((*stacks.shape, height, row))
+    shape = (*stacks.shape, height, row)
+    camera_grid = optics.grid(shape) if isinstance(optics, Optics) else optics
+    if camera_grid.shape_KLHW != shape:
+        stated = f"{camera_grid.height} x {camera_grid.width}"
+        raise InputError(f"{name}: is {height} x {row} px, and {stated} are stated, rows x columns")
     is_binary = bitpack or first.dtype == np.bool_
     count = stop - begin
     sums = np.zeros(camera_grid.shape_KLHW, np.min_scalar_type(count) if is_binary else np.uint64)
@@ -130,6 +141,8 @@ def import_counts(
             if isinstance(array, np.memmap):
                 array = stack.load()  # a new map, so that what was read leaves memory
             if not is_binary:
+                if number == 0 and start == begin:
+                    _warn_of_packed_bytes(name, piece, tell)
                 sums[camera] += whole_counts(stack.name, piece).sum(axis=0, dtype=np.uint64)
             else:
                 bits = np.unpackbits(piece, axis=2) if bitpack else piece.view(np.uint8)
@@ -149,6 +162,8 @@ def import_counts(
         report("views", number + 1, stacks.size)
     if not is_binary:
         return PhotonCounts.from_dense(sums, camera_grid, cfa=cfa, frames=count)
+    if bitpack:
+        _warn_of_dark_columns(sums, "--width" if isinstance(optics, Optics) else "w", tell)
     if total > MOST_KEPT:
         tell(
             f"only the sums of {count} frames are kept: there are {total} counts, and the frame of each is "
@@ -158,6 +173,26 @@ def import_counts(
     k, l, i, j, frame = np.concatenate(singles).T
     n = np.ones(k.size, np.uint8)
     return PhotonCounts.from_events(k, l, i, j, n, camera_grid, cfa=cfa, frames=count, bits=1, frame=frame)
+
+
+def _warn_of_packed_bytes(name: str, numbers: np.ndarray, tell: Tell) -> None:
+    """Warn of bytes whose high bits are set about as often as the low ones; in dim counts they are rarer."""
+    if numbers.dtype != np.uint8 or np.count_nonzero(numbers) < MIN_JUDGED_BYTES:
+        return
+    share = np.unpackbits(numbers[..., None], axis=-1).reshape(-1, 8).mean(axis=0)
+    if share.max() < 0.4 and share[:4].sum() > share.sum() / 3:
+        tell(f"warning: {name} looks like bits packed eight to a byte; if so, import again with --bitpack")
+
+
+def _warn_of_dark_columns(sums: np.ndarray, option: str, tell: Tell) -> None:
+    """Warn of columns at the end of packed rows without a count in any view."""
+    columns = sums.sum(axis=(0, 1, 2), dtype=np.int64)
+    width, lit = columns.size, int(np.flatnonzero(columns).max(initial=-1)) + 1
+    if lit < width and columns.sum() >= MIN_COLUMN_MEAN * width:
+        is_padding = -(-lit // 8) == -(-width // 8)  # padding is less than a byte
+        advice = f"import again with {option} {lit}" if is_padding else "cut them off the frames"
+        what = f"the last {width - lit} columns of {width} have no count in any view"
+        tell(f"warning: {what}; if the camera has fewer, {advice}")
 
 
 def _by_camera(
@@ -175,7 +210,8 @@ def _frames_of(path: Path) -> np.ndarray:
     """The frames (T, H, row) of a view: pages of a picture, or a .npy file, which is mapped into memory."""
     if is_picture(path):
         return _without_colours(path, np.stack([*decode(picture_of(path, VIEWS))]))
-    return map_array(path)
+    numbers = map_array(path)
+    return numbers[..., 0] if numbers.ndim == 4 and numbers.shape[3] == 1 else numbers  # one channel
 
 
 def _without_colours(path: Path, pixels: np.ndarray) -> np.ndarray:
@@ -201,8 +237,10 @@ def _stacks_of(
     tell: Tell,
 ) -> np.ndarray:
     """The frames of each view, (K, L) of `FrameStack`."""
-    if pattern is not None:
-        paths = order.arrange(files_by_camera(Path(str(source)), pattern, grid, order, tell))
+    is_table = isinstance(source, np.ndarray) and isinstance(next(iter(source.flat), None), Path)
+    if pattern is not None or is_table:
+        paths = source if is_table else files_by_camera(Path(str(source)), str(pattern), grid, order, tell)
+        paths = order.arrange(np.asarray(paths))
         stacks = np.empty(paths.shape, object)
         for camera, path in np.ndenumerate(paths):
             stacks[camera] = FrameStack(str(path), partial(_frames_of, path))

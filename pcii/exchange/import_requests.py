@@ -22,9 +22,9 @@ from pcii.exchange.image_folders import (
     is_picture,
 )
 from pcii.exchange.pixel_files import Encoding
-from pcii.exchange.posed_views import import_posed_pictures
+from pcii.exchange.posed_views import import_posed_cubes, import_posed_pictures
 from pcii.exchange.stated_cameras import Optics, Tell, ViewOrder
-from pcii.exchange.transforms_file import transforms_in
+from pcii.exchange.transforms_file import read_transforms, transforms_in
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
@@ -95,6 +95,7 @@ READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
     import_counts: ("photon counts", ("counts",)),
     import_hci: ("a scene of the HCI 4D light field benchmark", ()),
     import_posed_pictures: ("pictures with a transforms.json", ()),
+    import_posed_cubes: ("photon cubes with a transforms.json", ("counts",)),
 }
 """What a reader reads, and the options that it meets without being told."""
 GROUPS: dict[str, type[Any]] = {
@@ -113,7 +114,8 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
     pattern, is_counts = options["pattern"], options["counts"] or options["bitpack"]
     if pattern is None and options["lens_array"] is None:
         if transforms_in(source) is not None:
-            return import_posed_pictures
+            has_cubes = read_transforms(source, tell=lambda sentence: None).has_cubes
+            return import_posed_cubes if has_cubes else import_posed_pictures
         if (source / PARAMETERS).is_file():
             return import_hci
     if source.is_dir() and pattern is None:

@@ -1,4 +1,4 @@
-"""Pictures with the poses of their cameras, which have to be of one plane grid.
+"""Pictures and photon cubes with the poses of their cameras, which have to be of one plane grid.
 
 The frames of a transforms.json may be in any order and the rig anywhere in the world: right and down are
 those of the pictures.
@@ -11,13 +11,15 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.export_pictures import MM_PER_M
 from pcii.exchange.image_folders import radiance_of_files, views_of
 from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.stated_cameras import Tell, warn
-from pcii.exchange.transforms_file import MOST_PX, TransformsFile, read_transforms
+from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
@@ -30,8 +32,6 @@ DIGITS = 9
 """Of lengths that follow from poses: doubles leave more exact, so decimals come back as they were written."""
 USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
-ROUNDING = 1e-9
-"""Of numbers that are equal: metres, parts of a rotation, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +78,36 @@ def import_posed_pictures(
             f"{grid.height} x {grid.width}, rows x columns"
         )
     return views_of(radiance, grid, cfa)
+
+
+def import_posed_cubes(
+    source: str | Path,
+    *,
+    focal_mm: float | None = None,
+    pixel_mm: float | None = None,
+    sensor_mm: float | None = None,
+    cfa: str | None = None,
+    frames: tuple[int, int] | None = None,
+    bitpack: bool = False,
+    report: Report = silent,
+    tell: Tell = warn,
+) -> PhotonCounts:
+    """Photon counts of the photon cubes that a transforms.json names, whose cameras are those of pictures.
+
+    A cube is (T, H, W) or, if the file or `bitpack` says so, packed, uint8 (T, H, W / 8); an axis of one
+    channel may follow. `frames` are the first and the last to add up; `cfa` is the Bayer pattern where the
+    file has none. Raises `InputError`, naming the file, for cubes that differ from what it says.
+    """
+    file = read_transforms(source, tell=tell)
+    if file.cfa is not None and cfa not in (None, file.cfa):
+        raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
+    poses = find_grid(file)
+    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
+    paths = np.array(file.file_paths, object)[poses.numbers]
+    is_packed = bitpack or file.is_bitpacked
+    width = grid.width if is_packed else None
+    options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "tell": tell}
+    return import_counts(paths, grid, bitpack=is_packed, width=width, **options)
 
 
 def camera_grid_of(

@@ -1,7 +1,9 @@
-"""The file transforms.json of neural reconstruction (nerfstudio, Instant NGP), read and checked.
+"""The file transforms.json of neural reconstruction (nerfstudio, Instant NGP, visionsim), read and checked.
 
 The format is that of nerfstudio (docs/quickstart/data_conventions.md of its repository) and of Instant NGP.
-Cameras have the axes of OpenGL: X right, Y up, looking along -Z, in metres.
+visionsim names photon cubes instead of pictures, .npy files of the frames of a camera; a `file_path` at the
+top is the cube of a single camera, with a pose for each frame. Cameras have the axes of OpenGL: X right,
+Y up, looking along -Z, in metres.
 """
 
 import json
@@ -27,6 +29,8 @@ MOST_PX = 0.1
 MOST_SKEW = 1e-4
 """Of a rotation, from columns of unit length at right angles: at the edge of a picture of 2000 px a length
 that is wrong by this share moves a point by 0.1 px; matrices of 6 decimals are 100 times closer."""
+ROUNDING = 1e-9
+"""Of numbers that are equal: metres, parts of a rotation, pixels."""
 PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 """Values of camera_model that, without distortion, are pinholes."""
 DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye")
@@ -71,6 +75,10 @@ class _Frame(_Lens):
 class _Document(_Lens):
     frames: Annotated[list[_Frame], Field(min_length=1, max_length=MOST_POSES)]
     applied_scale: Positive = None
+    file_path: str | None = None
+    bitpack: bool | None = None
+    bitpack_dim: int | None = None
+    cfa: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +94,15 @@ class TransformsFile:
     width: int
     height: int
     file_paths: tuple[Path, ...]
-    """Picture of each frame."""
+    """Picture or photon cube of each frame."""
+    has_cubes: bool
+    is_bitpacked: bool
+    """Whether cubes have eight pixels in a byte."""
+    cfa: str | None
+    """Bayer pattern of photon cubes, None if the file has none."""
 
     def frame_name(self, number: int) -> str:
-        """What messages call a frame: the path of its picture."""
+        """What messages call a frame: the path of its picture or cube."""
         return visible(self.file_paths[number].relative_to(self.path.parent).as_posix())
 
 
@@ -107,16 +120,26 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `tell`
     takes the names of members that are not used. Raises `InputError`, naming file and member, for what is
     missing or wrong, pixels that are not square, lenses that distort, frames of different size or focal
-    length, matrices that are no poses, and paths that are used twice or lead out of the folder.
+    length, matrices that are no poses, paths that are used twice or lead out of the folder, photon cubes that
+    are not packed along the width, and a single cube whose camera moves.
     """
     file = transforms_in(Path(path)) or Path(path)
     document = _parsed(file)
     frames = document.frames
-    paths = [_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in enumerate(frames)]
+    is_single_cube = document.file_path is not None
+    named = [("", document)] if is_single_cube else [(f"frames.{n}.", f) for n, f in enumerate(frames)]
+    paths = [_path(file, f"{place}file_path", one.file_path) for place, one in named]
+    has_cubes = is_single_cube or document.bitpack is True or any(path.suffix == ".npy" for path in paths)
+    if has_cubes and any(path.suffix != ".npy" for path in paths):
+        raise InputError(f"{file}: file_path: expected .npy files, since photon cubes are in such files")
+    if document.bitpack and document.bitpack_dim not in (None, 2):
+        raise InputError(f"{file}: bitpack_dim: expected 2, the width, got {document.bitpack_dim}")
     if len({*paths}) < len(paths):
         name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
         raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
     if None in (document.w or frames[0].w, document.h or frames[0].h):
+        if has_cubes:
+            raise InputError(f"{file}: w, h: missing; the width and height of the frames in pixels")
         document.h, document.w, _ = picture_of(paths[0], VIEWS).shape
     lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(frames)]
     width, height, focal_px, _ = lenses[0]
@@ -128,17 +151,27 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
             )
     poses = np.stack([_pose(file, n, frame.transform_matrix) for n, frame in enumerate(frames)])
     poses[:, :3, 3] /= document.applied_scale or 1
+    centres_px = np.array([centre for *_, centre in lenses])
+    if is_single_cube:
+        if np.ptp(poses, axis=0).max() + np.ptp(centres_px, axis=0).max() > ROUNDING:
+            raise InputError(f"{file}: frames: the camera moves, and a moving camera is no grid")
+        poses, centres_px = poses[:1], centres_px[:1]
     unused = {**(document.model_extra or {}), **{name: 0 for f in frames for name in f.model_extra or {}}}
+    if document.cfa is not None and not has_cubes:
+        unused["cfa"] = document.cfa
     if unused:
         tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
         path=file,
         poses=poses,
-        centres_px=np.array([centre for *_, centre in lenses]),
+        centres_px=centres_px,
         focal_px=focal_px,
         width=width,
         height=height,
         file_paths=tuple(paths),
+        has_cubes=has_cubes,
+        is_bitpacked=document.bitpack is True,
+        cfa=None if document.cfa == "none" else document.cfa,
     )
 
 

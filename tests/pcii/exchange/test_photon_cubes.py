@@ -1,6 +1,7 @@
 # ruff: noqa: E501
 """Photon cubes and frames of strangers come in, and what is wrong is one sentence."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,26 @@ def test_exported_cubes_come_in_by_their_names(tmp_path: Path) -> None:
     check_counts(counts, BITS)
 
 
+@pytest.mark.parametrize(("grid", "cfa"), [(GRID, "GRBG"), (EIGHTS, None)])
+def test_exported_cubes_come_in_by_their_poses(tmp_path: Path, grid: CameraGrid, cfa: str | None) -> None:
+    cubes = write_cubes(tmp_path, bits_of(grid), grid, cfa)
+    assert run("import", cubes, "-o", tmp_path / "back", "--focal-mm", 50, "--counts") == 0
+    back = open_dataset(tmp_path / "back")
+    assert (back.cfa, back.grid.shape_KLHW, back.grid.shear_px) == (cfa, grid.shape_KLHW, grid.shear_px)
+    assert back.grid.pixel_mm == pytest.approx(grid.pixel_mm)
+    check_counts(back.counts, bits_of(grid))
+
+
+def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
+    view = write_cubes(tmp_path, BITS, GRID) / "01_02"
+    np.save(view / "frames.npy", packed(BITS[1, 2])[..., None])  # visionsim has an axis for the channel
+    options = ["--pixel-mm", 0.05, "--cfa", "RGGB", "--frames", 2, 8]
+    assert run("import", view, "-o", tmp_path / "one", *options) == 0
+    dataset = open_dataset(tmp_path / "one")
+    assert (dataset.grid.rows, dataset.grid.cols, dataset.grid.focal_mm, dataset.cfa) == (1, 1, 50, "RGGB")
+    np.testing.assert_array_equal(dataset.counts.view(0, 0), BITS[1, 2, 2:].sum(axis=0))
+
+
 @pytest.mark.parametrize(
     "kept", ["packed", "one file", "counted file", "bool", "bool array", "uint16", "tif"]
 )
@@ -112,6 +133,30 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
         check_counts(counts, seen)
 
 
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.3])
+def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
+    rng, told = np.random.default_rng(1), []
+    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, tell=told.append)
+    assert told == [
+        "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
+    ]
+    counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
+    import_counts(counts, OPTICS, tell=told.append)
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("lit", "width", "advice"),
+    [(61, 64, "import again with --width 61"), (61, None, "import again with --width 61"), (50, 64, "cut them off the frames"), (61, 61, None)],
+)  # fmt: skip
+def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
+    bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
+    bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
+    import_counts(packed(bits), OPTICS, bitpack=True, width=width, tell=told.append)
+    words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
+    assert told == ([] if advice is None else [words])
+
+
 def test_many_single_counts_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(count_arrays, "MOST_KEPT", 100)
     source = files_of(tmp_path / "views", BITS)
@@ -134,6 +179,19 @@ def views(array: np.ndarray) -> Make:
     return make
 
 
+def cubes(view: str = ".", **members: Any) -> Make:
+    """An export, or one camera of it, of which members of its transforms.json are replaced."""
+
+    def make(root: Path) -> Path:
+        folder = write_cubes(root, BITS, GRID) / view
+        document = json.loads((folder / "transforms.json").read_text()) | members
+        (folder / "transforms.json").write_text(json.dumps(document))
+        return folder
+
+    return make
+
+
+POSES = [{"transform_matrix": (np.eye(4) + step * np.eye(4, k=3)).tolist()} for step in (0, 1e-6)]
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("frames beyond", views(CUBE), [*PACKED, "--frames", 3, 9], r"has the frames 0 to 8; .* got 3 and 9"),
     ("type", views(CUBE.astype(np.int8)), PACKED, "1_0.npy: has frames int8"),
@@ -142,6 +200,15 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("width of files", views(CUBE), [*PACKED, "--width", 17], "rows are of 9 to 16 pixels, and the stated width is 17"),
     ("with light", views(CUBE), ["--bitpack", "--srgb", "--pattern", "{row}_{col}.npy", *CAMERAS], "--srgb: not for"),
     ("width alone", views(CUBE), ["--counts", "--pattern", "{row}_{col}.npy", *CAMERAS, "--width", 13], "--width: is for packed frames"),
+    ("other axis", cubes(bitpack_dim=1), [], "bitpack_dim: expected 2, the width, got 1"),
+    ("stated width", cubes(w=30, cx=15), [], "rows are of 9 to 16 pixels, and the stated width is 30"),
+    ("stated height", cubes(h=12, cy=6), [], "is 11 x 13 px, and 12 x 13 are stated"),
+    ("no size", cubes(w=None), [], "w, h: missing"),
+    ("pattern twice", cubes(cfa="RGGB"), ["--cfa", "GRBG"], "cfa: is RGGB; leave out --cfa"),
+    ("light of cubes", cubes(), ["--linear"], "--linear: not for .*, which is read as photon cubes"),
+    ("moving camera", cubes("00_01", frames=POSES), [], "the camera moves, and a moving camera is no grid"),
+    ("no cube", cubes("00_01", file_path="frames.png"), [], "file_path: expected .npy files"),
+    ("missing", cubes("00_01", file_path="none.npy"), [], "none.npy: cannot be read"),
 ]  # fmt: skip
 
 

@@ -79,6 +79,18 @@ def test_a_file_of_another_name_and_options_of_light_and_film(tmp_path: Path, ca
     np.testing.assert_allclose(dataset.views.view(1, 2)[0, :2, 0], [first[1], second[0]], rtol=1e-5)
 
 
+def test_cubes_that_are_not_packed_come_in_by_their_poses(tmp_path: Path) -> None:
+    source = posed(tmp_path / "data", 1, 2)
+    path = source / "transforms.json"
+    path.write_text(path.read_text().replace(".png", ".npy"))
+    bits = np.random.default_rng(1).random((2, 5, H, W)) < 0.2
+    for l in range(2):
+        np.save(source / "images" / f"0_{l}.npy", bits[l])
+    dataset = imported(source)
+    assert (dataset.grid.pitch_mm, dataset.counts.readout.frames) == ((2, 2), 5)
+    np.testing.assert_array_equal(dataset.counts.dense[0], bits.sum(axis=1))
+
+
 def test_pictures_that_do_not_fit(tmp_path: Path, capsys) -> None:
     source = posed(tmp_path / "a", w=W + 1)
     assert f"is {H} x {W} px, where transforms.json says {H} x {W + 1}" in refused(capsys, source)

@@ -131,7 +131,7 @@ def test_one_member_of_any_kind_gives_a_grid_or_one_sentence(tmp_path_factory, d
     place = data.draw(
         st.sampled_from([document, frame, *frame["transform_matrix"], frame["transform_matrix"]])
     )
-    names = list(range(len(place))) if isinstance(place, list) else [*place, "cx", "k1"]
+    names = list(range(len(place))) if isinstance(place, list) else [*place, "cx", "k1", "bitpack"]
     place[data.draw(st.sampled_from(names))] = data.draw(ODD)
     path = tmp_path_factory.mktemp("odd") / "transforms.json"
     path.write_text(json.dumps(document))
