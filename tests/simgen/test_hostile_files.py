@@ -184,7 +184,7 @@ def test_environments_that_cannot_shine(tmp_path: Path) -> None:
         (exr("grey.exr", ones[..., :1]), "4 x 8 px, 1 channels .* R, G and B, twice as wide as high"),
         (exr("square.exr", ones[:, :4]), "4 x 4 px, 3 channels .* twice as wide as high"),
         (tmp_path / "truncated.exr", "damaged or cut off"),
-        (tmp_path / "large.exr", "100000 x 100000 px, and at most"),
+        (tmp_path / "large.exr", "cannot be read"),
         (tmp_path / "sky.hdr", "not an EXR picture"),
     ):
         with pytest.raises(InputError, match=message) as caught:

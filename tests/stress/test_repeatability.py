@@ -32,10 +32,10 @@ def results(grid: pcii.CameraGrid = GRID) -> dict[str, str]:
     few = pcii.limit_photons(pcii.Views(rng.random((*grid.shape_KLHW, 3)), grid), 50, seed=1, cfa="GRBG")
     made: dict[str, np.ndarray] = {"photons": np.stack([few.events.i, few.events.j])}
     for name, counts in (("dense", dense), ("sparse", few)):
-        for subpixel in (1, 2):
-            sections = pcii.reconstruct(counts, [400, 500], subpixel=subpixel, variance=True)
-            assert sections.variance is not None
-            made |= {f"{name} {subpixel}": sections.counts, f"{name} {subpixel} variance": sections.variance}
+        sections = pcii.reconstruct(counts, [400, 500], variance=True)
+        assert sections.variance is not None
+        made |= {f"{name} 1": sections.counts, f"{name} variance": sections.variance}
+        made[f"{name} 2"] = pcii.reconstruct(counts, [400, 500], subpixel=2).counts
         for method in pcii.removal_methods():
             made[f"{name} {method}"] = pcii.segment(counts, [400, 500], method=method).in_focus
         for method in pcii.depth_methods(counts):

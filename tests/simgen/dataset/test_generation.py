@@ -2,7 +2,6 @@
 
 import fcntl
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -129,28 +128,6 @@ def test_another_run_may_look_at_it_the_moment_it_is_finished(
     monkeypatch.undo()
     generate(recipe(), Path(), out)  # the other run
     assert digest(out) == digest(made)
-
-
-def test_a_second_run_that_waited_for_the_first_finds_its_dataset(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "shared"
-    original, locks = fcntl.flock, list[int]()
-
-    def first_run_ends_now(file: object, operation: int) -> None:
-        if not locks:  # between the second run's opening of the marker and its locking it
-            shutil.copytree(made, out, dirs_exist_ok=True)
-            (out / MARKER).unlink()
-        locks.append(operation)
-        original(file, operation)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(fcntl, "flock", first_run_ends_now)
-    monkeypatch.setattr(rendered_views, "render_view", lambda *_: pytest.fail("rendered again"))
-    manifest = generate(recipe(), Path(), out)
-    assert len(locks) == 2
-    assert manifest["timings_s"] == open_dataset(made).manifest["timings_s"]
-    assert not (out / MARKER).exists()
-    assert verify(out) == len(manifest["files"])
 
 
 def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
