@@ -83,6 +83,7 @@ def draw_from_views(
                     f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
                 )
         else:
+            assert photons.scope != "exposure"  # which has a gain
             light = Light(photons.budget, photons.scope)
             rates = photon_rates(raw, cfa, light, normalisers[number])
         rng = seeds.generator(capture.seed, view=number, stage="photons")
