@@ -34,12 +34,12 @@ def grid(**changes: Any) -> CameraGrid:
 
 
 @pytest.mark.renders
-def test_a_preview_and_a_sheet_show_something(small_dataset: Path, tmp_path: Path) -> None:
+def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Path) -> None:
     look, sheet = tmp_path / "look.jpg", tmp_path / "sheet.png"
     title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
     command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "2", *title]
     assert command_line.run(cli.app, command) == 0
-    assert command_line.run(cli.app, ["sheet", str(small_dataset), "-o", str(sheet)]) == 0
+    assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
     assert_shows_something(look)
     assert_shows_something(sheet)
 

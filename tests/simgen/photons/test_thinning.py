@@ -30,9 +30,9 @@ from simgen.truth.first_hits import first_hits_of_view
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"
 # A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
-DRAWS = 40 if COMPILED else 25
-MANY = 400_000 if COMPILED else 50_000
-COLOUR_BIAS = 0.01 if COMPILED else 0.05
+DRAWS = 25
+MANY = 100_000 if COMPILED else 50_000
+COLOUR_BIAS = 0.03 if COMPILED else 0.05
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
 
 
@@ -43,9 +43,9 @@ def scene() -> RenderScene:
 
 @pytest.fixture(scope="module")
 def radiance(scene: RenderScene) -> np.ndarray:
-    """Mosaics (V, H, W) from 2048 samples per pixel: good to about 1.4 % per pixel, 0.14 % per tile."""
+    """Mosaics (V, H, W) from 1024 samples per pixel: good to about 2 % per pixel, 0.2 % per tile."""
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
@@ -166,8 +166,8 @@ def colour_p_value(found: np.ndarray, radiance: np.ndarray, bias: np.ndarray) ->
     """Of a chi-square test with two degrees of freedom of photons (3,) against biased colours."""
     share = np.array([rates_of(radiance, 1.0)[:, colour_of_pixel == c].sum() for c in range(3)]) * bias
     expected = found.sum() * share / share.sum()
-    # The reference is good to 0.03 % of a colour, which adds a third to the variance of 1.6 million.
-    square = ((found - expected) ** 2 / expected).sum() / (1 + MANY / 1_250_000)
+    # The reference is good to 0.04 % of a colour, which adds half to the variance of 1.6 million photons.
+    square = ((found - expected) ** 2 / expected).sum() / (1 + MANY / 800_000)
     return float(stats.chi2.sf(square, 2))
 
 
@@ -179,7 +179,7 @@ def biased(colour: int) -> np.ndarray:
     return np.where(np.arange(3) == colour, 1 + COLOUR_BIAS, 1.0)
 
 
-def test_colours_are_true_to_a_percent(scene: RenderScene, radiance: np.ndarray) -> None:
+def test_colours_are_true_to_three_percent(scene: RenderScene, radiance: np.ndarray) -> None:
     found = photons_by_colour(scene, 3)
     assert colour_p_value(found, radiance, UNBIASED) > 1e-3
     assert colour_p_value(found, radiance, biased(0)) < 1e-3
@@ -269,7 +269,7 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     drawn, log = draw_with_log(scene, 1, budget=budget)
     assert log["paths_above_bound"] <= 1e-2 * log["kept"]
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=3 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
@@ -317,13 +317,13 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
         for number in range(16)
     ]
     scene = lit(stripes)
-    counts = counted(draw(scene, 1, budget=30_000))
+    counts = counted(draw(scene, 1, budget=20_000))
     # Stripes' edges vary most within pixels: with fewer samples the rates' own noise would show.
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
-    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 30_000.0)
+    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 20_000.0)
     for colour in range(3):
         found, own = (
             counts[:, colour_of_pixel == colour].ravel(),
@@ -402,10 +402,10 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         expected = on_tiles(rates_of(radiance, MANY / 20) if gain is None else gain * radiance)
         found = on_tiles(counted(drawn))
         seen = expected > 5
-        # The reference is good to 0.14 % of a tile.
+        # The reference is good to 0.2 % of a tile.
         return float(
             stats.chi2.sf(
-                ((found - expected)[seen] ** 2 / (expected + (0.0014 * expected) ** 2)[seen]).sum(),
+                ((found - expected)[seen] ** 2 / (expected + (0.002 * expected) ** 2)[seen]).sum(),
                 seen.sum(),
             )
         )
