@@ -97,7 +97,7 @@ def test_photons_of_long_paths_are_those_of_rendered_views() -> None:
         return built, seen(built, grid, samples)
 
     built, view = rendered(depth, 2048)
-    gain = (10_000 if SCALAR else 30_000) / view.sum() * 3
+    gain = (10_000 if SCALAR else 15_000) / view.sum() * 3
     photons, _ = thinned(built, grid, depth, gain)
     assert abs(surprise(photons, view, grid, gain)) < 5
     # The fault: paths of four segments less, which lack a tenth of the red light.

@@ -27,10 +27,8 @@ def wall(random):
     behind = simgen.Backdrop(z_mm=random.uniform(400, 600), reflectance=(0.8, 0.8, 0.8))
     return simgen.Scene(title="A wall", lights=[simgen.UniformLight(luminance_cd_m2=100.0)], backdrop=behind)
 """
-GRID = {"rows": CAMERAS, "cols": CAMERAS, "pitch_mm": [1e-3, 1e-3], "pixel_mm": 0.3} | {
-    "height": SIDE,
-    "width": SIDE,
-}
+GRID = {"rows": CAMERAS, "cols": CAMERAS, "pitch_mm": [1e-3, 1e-3]}
+GRID |= {"pixel_mm": 0.3, "height": SIDE, "width": SIDE}
 SENSOR = {"quantum_efficiency": [0.5, 0.5, 0.5], "dark_counts": 0.1}
 RECIPE: dict[str, Any] = {"seed": 11, "grid": GRID, "sensor": SENSOR, "products": {"truth": False}}
 OTHERS: list[dict[str, Any]] = [

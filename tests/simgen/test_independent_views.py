@@ -20,7 +20,7 @@ pytestmark = pytest.mark.renders
 SIDE, CAMERAS = 32, 6
 VIEWS, PAIRS = CAMERAS**2, CAMERAS**2 * (CAMERAS**2 - 1) // 2
 MOST = 5 / SIDE
-"""Of 630 coefficients of independent noise, each normal of width 1 / 32, one in 2700 times one exceeds it."""
+"""Of 630 independent coefficients, each normal of width 1 / 32, one exceeds it in one of 2700 cases."""
 SCENE = """title = "An evenly lit wall"
 lights = [{ %s }]
 """

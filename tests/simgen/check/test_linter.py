@@ -318,7 +318,6 @@ def test_a_camera_inside_an_object_and_a_scene_in_the_dark() -> None:
     dark = probed([ball("a", 0, 500, GREY)], lamp)
     assert dark.luminance == 0
     assert "bad" in verdicts(about("lights", findings(dark)))
-    assert probed([ball("a", 0, 500, GREY)], lamp | {"target_mm": (0, 0, 500)}).luminance > 0
 
 
 def test_a_coarser_film_has_the_same_field_of_view() -> None:
@@ -354,11 +353,10 @@ type = "uniform"
 luminance_cd_m2 = 10
 """
     file.write_text(text)
-    for target in (tmp_path, file):
-        assert command_line.run(cli.app, ["check", str(target)]) == 1
-        output = capsys.readouterr()
-        assert "lost is at z = -520 to -480 mm" in output.out
-        assert output.err == ""
+    assert command_line.run(cli.app, ["check", str(file)]) == 1
+    output = capsys.readouterr()
+    assert "lost is at z = -520 to -480 mm" in output.out
+    assert output.err == ""
     file.write_text(text.replace("radius_mm", "radius"))
     for target, words in ((tmp_path, "radius"), ("nowhere", "there is no scene or recipe 'nowhere'")):
         assert command_line.run(cli.app, ["check", str(target)]) == 2
