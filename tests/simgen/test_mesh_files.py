@@ -143,14 +143,12 @@ def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tm
     np.testing.assert_allclose(image_of(tmp_path, name), srgb_to_linear(upright), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("bits", "zero_is"), [(1, "white"), (4, "black"), (12, "black"), (12, "white")])
-def test_tiff_of_any_bits_is_as_bright(bits: int, zero_is: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("bits", [4, 12])
+def test_tiff_of_any_bits_is_as_bright(bits: int, tmp_path: Path) -> None:
     numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
-    stored = numbers.astype({1: "bool", 4: "uint8", 12: "uint16"}[bits])
-    written_bits = None if bits == 1 else bits
-    tifffile.imwrite(tmp_path / "a.tif", stored, photometric=f"minis{zero_is}", bitspersample=written_bits)
-    share = numbers / ((1 << bits) - 1)
-    expected = srgb_to_linear(1 - share if zero_is == "white" else share)
+    stored = numbers.astype({4: "uint8", 12: "uint16"}[bits])
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric="minisblack", bitspersample=bits)
+    expected = srgb_to_linear(numbers / ((1 << bits) - 1))
     half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
     np.testing.assert_allclose(image_of(tmp_path, "a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step)
 

@@ -113,12 +113,6 @@ def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float
         assert in_blocks(view).max() < 1 + 5 * 0.5 / np.sqrt(4096)
 
 
-def test_clear_light_is_lost_by_roughness_alone() -> None:
-    material = painted({"transmission": 1.0, "roughness": 0.05}, (1.0, 1.0, 1.0))
-    view = seen(made([ball(material)], [EVERYWHERE], max_depth=12), GRID, 256)
-    np.testing.assert_allclose(view.mean(axis=(0, 1)), 1, atol=3e-3)
-
-
 @pytest.mark.parametrize(("bits", "field"), [(8, "metallic"), (16, "roughness"), (8, "clearcoat")])
 def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int, field: str) -> None:
     most = 2**bits - 1

@@ -18,7 +18,6 @@ from simgen.sensor.detector import (
     fixed_totals,
     full_light_image,
     nested_subset,
-    read_out,
 )
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import FullLight, Lens, Photons, Sensor
@@ -44,13 +43,6 @@ def film_of(table: PhotonTable) -> np.ndarray:
 
 
 # The sensor
-
-
-@given(SEEDS, st.integers(0, 60), st.integers(1, 32), st.sampled_from([1, 50, 2**40]))
-def test_a_counter_stops_at_its_largest_number(seed: int, number: int, bits: int, most: int) -> None:
-    arrivals = photons_of(seed, number, most)
-    stopped = read_out(arrivals, GRID, Sensor(bits=bits), seed)
-    np.testing.assert_array_equal(film_of(stopped), np.minimum(film_of(arrivals), 2**bits - 1))
 
 
 @given(SEEDS, st.integers(1, 80), st.integers(1, 5), st.data())

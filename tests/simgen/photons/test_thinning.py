@@ -484,11 +484,3 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
         made = plan(capture, setup, backend.choose().kind)
         assert (made.thins, bool(made.why_rendered)) == (is_bounded, not is_bounded)
         assert made.noise <= MAX_NOISE_SHARE
-
-
-def test_photons_per_radiance_are_asked_for_with_an_exposure_and_no_budget(scene: RenderScene) -> None:
-    setup = Setup(scene, GRID, "GRBG", DEPTH)
-    with pytest.raises(ValueError, match="photons_per_radiance: needed"):
-        thin_photons(setup, Photons(scope="exposure"), seed=1)
-    with pytest.raises(ValueError, match="and for no others"):
-        thin_photons(setup, Photons(budget=10), seed=1, photons_per_radiance=0.1)
