@@ -1,5 +1,6 @@
 """Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,15 +56,22 @@ def setup_of(scene: RenderScene) -> Setup:
     return Setup(scene, GRID, "GRBG", DEPTH)
 
 
-found_out: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+explorations: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def scenes_are_given_up() -> Iterator[None]:
+    """The renderer compiles its kernels anew where other scenes are in memory than in the last run."""
+    yield
+    explorations.clear()
 
 
 def explored(scene: RenderScene, settings: Photons) -> Exploration:
     """It is the same for all seeds, and takes longer than a draw of few photons."""
     key = id(scene), settings.model_dump_json()
-    if key not in found_out:
-        found_out[key] = scene, explore(setup_of(scene), settings)
-    return found_out[key][1]
+    if key not in explorations:
+        explorations[key] = scene, explore(setup_of(scene), settings)
+    return explorations[key][1]
 
 
 def draw_with_log(scene: RenderScene, seed: int, **photons: object) -> tuple[PhotonTable, dict[str, Any]]:
