@@ -168,10 +168,6 @@ def test_a_page_runs(
         CHECKS[name](names)
 
 
-def test_all_that_is_prepared_belongs_to_a_page() -> None:
-    assert {*SLOW, *GIVEN, *CHECKS} <= set(RUN)
-
-
 def test_the_recipes_of_the_guide_are_valid() -> None:
     whole, sweep = (block.text for block in blocks(DOCS / "recipes.md") if block.language == "toml")
     assert Recipe.model_validate(tomllib.loads(whole)).photons.nested == (100, 300)

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.photon_distance import Rates, distances
-from benchmarks.studies import demosaicing, radiance_images, section_growth, sections, skips
-from benchmarks.studies.depth_and_focus import BOUND, DEPTH, REMOVAL, _ratios, _rows
-from benchmarks.studies.photon_images import CROSSOVERS, THINNING, _crossovers, dense_name
-from pcii.evaluation.rows import frame_of
-from pcii.evaluation.summary import means
+from benchmarks.studies import demosaicing, radiance_images, sections, skips
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
 BUDGET = 5.0 * 64**2
@@ -50,22 +46,6 @@ def test_wrong_rates_show_in_tiles_and_noise_of_the_truth_does_not() -> None:
     assert allowed["tile_chi_square"].value < 1
 
 
-def test_crossovers_lie_between_the_budgets_that_were_tried() -> None:
-    seconds = {(THINNING, 10.0): [1.0], (THINNING, 1000.0): [4.0]}
-    seconds |= {(dense_name(n), b): [t] for n, t in ((1, 0.5), (4, 2.0), (16, 8.0)) for b in (10.0, 1000.0)}
-    found = _crossovers("matt", (1, 4, 16), seconds)
-    assert [row.parameters["where"] for row in found] == ["below", "at", "above"]
-    assert all(row.table == CROSSOVERS for row in found)
-    # Half way in logarithms, of time and of photons.
-    assert found[1].values["photons_per_view"].value == pytest.approx(100)
-
-
-def test_exponents_are_slopes_of_logarithms() -> None:
-    numbers = [1, 10, 100]
-    found = section_growth._slope(numbers, [[0.1 * n**1.5] * 6 for n in numbers])
-    assert found.value == pytest.approx(1.5)
-
-
 def test_errors_of_sections_are_relative_to_the_contrast() -> None:
     truth = np.full((64, 64, 1), 0.5)
     found = truth + 0.03
@@ -100,23 +80,3 @@ def test_a_difference_of_one_byte_is_a_difference() -> None:
     assert skips.are_same(one, {name: each.copy() for name, each in one.items()})
     assert not skips.are_same(one, one | {"b": np.array([0, 1])})
     assert not skips.are_same(one, {"a": one["a"]})
-
-
-def test_results_of_an_evaluation_become_rows() -> None:
-    head = {"title": "balls", "recipe": "r", "identity": "1", "dataset": "balls", "budget": 100.0}
-    head |= {"seed": 1, "photons_per_view": 100.0, "seconds": 0.5}
-    planes = [{"z_mm": 1.0, "truth": "object", "object": "ball", "iou": 0.8}]
-    measured = [
-        {"method": "depth:posterior", "depth": {"bad_1px": 0.1, "median_px": None}, "bound_px": 0.25},
-        {"method": "depth:variance-sweep", "depth": {"bad_1px": 0.4}},
-        {"method": "likelihood", "planes": planes, "objects": []},
-    ]
-    rows = _rows(means(frame_of([head | row for row in measured])))
-    assert [row.table for row in rows] == [DEPTH, DEPTH, REMOVAL, BOUND]
-    assert (rows[0].values["time_ms"].value, rows[0].values["time_ms"].high) == (500, None)
-    assert rows[0].values["bad_1px_percent"].value == 10
-    assert "median_px" not in rows[0].values
-    assert rows[3].values["sigma_px"].value == 0.25
-    (ratio,) = _ratios(rows)
-    assert ratio.name == "balls, 100 photons: errors of the better sweep against depth:posterior"
-    assert ratio.ratio.value == pytest.approx(4)

@@ -1,11 +1,13 @@
 """Every skip that claims the same bytes gives them, on one small scene."""
 
 import pytest
+from property_settings import mostly_slow
 
-from benchmarks.skips import SKIPS, Skip, World
+from benchmarks.skips import SKIPS, World
 from benchmarks.studies.skips import are_same, random_world
 
-EXACT = [skip for skip in SKIPS if skip.exact]
+EXACT = {skip.name: skip for skip in SKIPS if skip.exact}
+QUICK = [name for name in EXACT if name.startswith(("exploration", "visibility", "what datasets"))]
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +18,9 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize("skip", EXACT, ids=lambda skip: skip.name.partition(":")[0])
-def test_skipped_work_is_not_missed(world: World, skip: Skip) -> None:
+@pytest.mark.parametrize("name", mostly_slow(EXACT, quick=QUICK))
+def test_skipped_work_is_not_missed(world: World, name: str) -> None:
+    skip = EXACT[name]
     on, off = skip.on(world, f"{skip.name}, on"), skip.off(world, f"{skip.name}, off")
     assert on
     assert are_same(on, off)

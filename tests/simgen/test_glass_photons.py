@@ -57,19 +57,19 @@ def test_photons_through_glass_are_those_of_rendered_views(light: str, depth: in
         return lit_views.made(objects, [lamp], max_depth=max_depth, folder=tmp_path)
 
     built = made([BEHIND, BALL, PANE], max_depth=depth)
-    view = seen(built, GRID, 512 if SCALAR else 2048)
-    gain = (20_000 if SCALAR else 100_000) / view.sum() * 3
+    view = seen(built, GRID, 512)
+    gain = (20_000 if SCALAR else 40_000) / view.sum() * 3
     photons, log = thinned(built, GRID, depth, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 5
     assert log["paths_above_bound"] <= max(1e-3 * photons.k.size, 3)
     # The faults: what is seen through the pane, or upside down in the ball, is that without glass.
-    bare = seen(made([BEHIND], max_depth=depth), GRID, 256)
+    bare = seen(made([BEHIND], max_depth=depth), GRID, 128)
     for half in (slice(0, 16), slice(16, 32)):
         without = view.copy()
         without[:, half] = bare[:, half]
         assert surprise(photons, without, GRID, gain) > 5
     # The fault: paths that are too short to leave the glass.
-    short = seen(made([BEHIND, BALL, PANE], max_depth=3), GRID, 256)
+    short = seen(made([BEHIND, BALL, PANE], max_depth=3), GRID, 128)
     assert surprise(photons, np.maximum(short, 1e-3), GRID, gain) > 5
 
 
@@ -96,9 +96,9 @@ def test_photons_of_long_paths_are_those_of_rendered_views() -> None:
         built = lit_views.made([room, BALL], [lamp], max_depth=max_depth)
         return built, seen(built, grid, samples)
 
-    built, view = rendered(depth, 2048 if SCALAR else 4096)
-    gain = (10_000 if SCALAR else 50_000) / view.sum() * 3
+    built, view = rendered(depth, 2048)
+    gain = (10_000 if SCALAR else 15_000) / view.sum() * 3
     photons, _ = thinned(built, grid, depth, gain)
     assert abs(surprise(photons, view, grid, gain)) < 5
     # The fault: paths of four segments less, which lack a tenth of the red light.
-    assert surprise(photons, rendered(depth - 4, 2048)[1], grid, gain) > 5
+    assert surprise(photons, rendered(depth - 4, 1024)[1], grid, gain) > 5

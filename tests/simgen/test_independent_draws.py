@@ -13,7 +13,8 @@ from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import Recipe
 
-SIDE, VIEWS = 16, 64
+SIDE, CAMERAS = 16, 6
+VIEWS = CAMERAS**2
 MOST_OF_TOTALS = 5 / np.sqrt(VIEWS)
 MOST_OF_PIXELS = 5 / np.sqrt(VIEWS * SIDE**2)
 """Coefficients of independent noise are normal and one in two million exceeds 5 deviations."""
@@ -26,7 +27,8 @@ def wall(random):
     behind = simgen.Backdrop(z_mm=random.uniform(400, 600), reflectance=(0.8, 0.8, 0.8))
     return simgen.Scene(title="A wall", lights=[simgen.UniformLight(luminance_cd_m2=100.0)], backdrop=behind)
 """
-GRID = {"rows": 8, "cols": 8, "pitch_mm": [1e-3, 1e-3], "pixel_mm": 0.3, "height": SIDE, "width": SIDE}
+GRID = {"rows": CAMERAS, "cols": CAMERAS, "pitch_mm": [1e-3, 1e-3]}
+GRID |= {"pixel_mm": 0.3, "height": SIDE, "width": SIDE}
 SENSOR = {"quantum_efficiency": [0.5, 0.5, 0.5], "dark_counts": 0.1}
 RECIPE: dict[str, Any] = {"seed": 11, "grid": GRID, "sensor": SENSOR, "products": {"truth": False}}
 OTHERS: list[dict[str, Any]] = [
@@ -51,7 +53,7 @@ def counts(folder: Path, budget: float, method: str) -> np.ndarray:
         recipe = Recipe.model_validate(RECIPE | values | {"photons": {"budget": own}})
         assert generate(recipe, folder, folder / str(number))["photons"]["method"] == method
         views = open_dataset(folder / str(number)).counts
-        found.append([views.view(k, l).ravel() for k, l in np.ndindex(8, 8)])
+        found.append([views.view(k, l).ravel() for k, l in np.ndindex(CAMERAS, CAMERAS)])
     return np.array(found)
 
 

@@ -148,8 +148,7 @@ def test_tiff_of_any_bits_is_as_bright(bits: int, tmp_path: Path) -> None:
     numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
     stored = numbers.astype({4: "uint8", 12: "uint16"}[bits])
     tifffile.imwrite(tmp_path / "a.tif", stored, photometric="minisblack", bitspersample=bits)
-    share = numbers / ((1 << bits) - 1)
-    expected = srgb_to_linear(share)
+    expected = srgb_to_linear(numbers / ((1 << bits) - 1))
     half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
     np.testing.assert_allclose(image_of(tmp_path, "a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step)
 

@@ -34,12 +34,12 @@ def grid(**changes: Any) -> CameraGrid:
 
 
 @pytest.mark.renders
-def test_a_preview_and_a_sheet_show_something(small_dataset: Path, tmp_path: Path) -> None:
+def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Path) -> None:
     look, sheet = tmp_path / "look.jpg", tmp_path / "sheet.png"
     title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
     command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "2", *title]
     assert command_line.run(cli.app, command) == 0
-    assert command_line.run(cli.app, ["sheet", str(small_dataset), "-o", str(sheet)]) == 0
+    assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
     assert_shows_something(look)
     assert_shows_something(sheet)
 
@@ -110,16 +110,3 @@ def test_a_photon_lights_its_own_block_and_colour_in_its_view() -> None:
     tiles = photon_tiles(counts)  # 24 blocks along 60 pixels at the fewest, of 3 x 3 pixels
     tiles[20:22], tiles[:, 14:16], tiles[:, 30:32] = 0, 0, 0  # the gaps
     assert np.argwhere(tiles).tolist() == [[22 + 3, 16 + 7, 0]]
-
-
-@pytest.mark.parametrize(("photons", "side_px"), [(0, 3), (1000, 2), (10**6, 1)])
-def test_photons_are_shown_in_blocks_that_hold_some(photons: int, side_px: int) -> None:
-    dense = np.random.default_rng(0).poisson(photons / 2400, grid().shape_KLHW)
-    tiles = photon_tiles(PhotonCounts.from_dense(dense, grid()))
-    assert tiles.shape == (2 * (60 // side_px + 2) - 2, 3 * (-(-40 // side_px) + 2) - 2, 3)
-
-
-def test_of_large_grids_some_views_are_shown() -> None:
-    dense = np.ones(grid(rows=30, cols=1).shape_KLHW, dtype=int)
-    tiles = photon_tiles(PhotonCounts.from_dense(dense, grid(rows=30, cols=1)))
-    assert tiles.shape[0] == 12 * (60 + 2) - 2

@@ -19,6 +19,7 @@ EVERYWHERE = {"type": "uniform", "luminance_cd_m2": 1.0}
 LAMP = {"type": "point", "position_mm": (150.0, -200.0, 50.0), "intensity_cd": 0.5}
 COLOUR = (0.8, 0.5, 0.2)
 GRID = film()
+SAMPLES = 512
 DEPTH = 6
 
 
@@ -87,20 +88,21 @@ def by_hand(parameters: dict[str, Any], *, clear: bool) -> RenderScene:
 def test_each_number_does_what_it_does_to_the_renderers_own(ours: dict, theirs: dict) -> None:
     material, clear = painted(ours), "transmission" in ours
     built = made([ball(material), card(600.0, 300.0, material)], [EVERYWHERE, LAMP], max_depth=DEPTH)
-    view = seen(built, GRID, 1024)
+    view = seen(built, GRID, SAMPLES)
     theirs = {"eta": 1.5, "roughness": 0.5, **theirs}
-    same = seen(by_hand(theirs, clear=clear), GRID, 1024, seed=2)
-    # Blocks of 4 x 4 pixels of 1024 paths that vary by 1 or less of the mean, twice.
+    same = seen(by_hand(theirs, clear=clear), GRID, SAMPLES, seed=2)
+    # Blocks of 4 x 4 pixels of paths that vary by 1 or less of the mean, twice.
     first, second = in_blocks(view), in_blocks(same)
-    np.testing.assert_allclose(first, second, rtol=5 * 2**0.5 / np.sqrt(16 * 1024))
-    np.testing.assert_allclose(view.mean(axis=(0, 1)), same.mean(axis=(0, 1)), rtol=2e-3)
+    np.testing.assert_allclose(first, second, rtol=5 * 2**0.5 / np.sqrt(16 * SAMPLES))
+    np.testing.assert_allclose(view.mean(axis=(0, 1)), same.mean(axis=(0, 1)), rtol=3e-3)
     # The planted fault: the number does nothing.
-    plain = seen(by_hand({"eta": 1.5, "roughness": 0.5}, clear=False), GRID, 1024)
-    assert np.abs(first / in_blocks(plain) - 1).max() > 5 * 2**0.5 / np.sqrt(16 * 1024)
+    plain = seen(by_hand({"eta": 1.5, "roughness": 0.5}, clear=False), GRID, SAMPLES)
+    assert np.abs(first / in_blocks(plain) - 1).max() > 5 * 2**0.5 / np.sqrt(16 * SAMPLES)
 
 
-@pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("roughness", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize(
+    ("metallic", "roughness"), [(0.0, 0.05), (0.0, 1.0), (0.5, 0.3), (1.0, 0.05), (1.0, 1.0)]
+)
 def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float) -> None:
     # White of no metal gains up to 10 % by the model, as docs/scenes.md says; a metal nothing at all.
     colour = (1.0,) * 3 if metallic == 1 else (0.95,) * 3
@@ -111,14 +113,8 @@ def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float
         assert in_blocks(view).max() < 1 + 5 * 0.5 / np.sqrt(4096)
 
 
-def test_clear_light_is_lost_by_roughness_alone() -> None:
-    material = painted({"transmission": 1.0, "roughness": 0.05}, (1.0, 1.0, 1.0))
-    view = seen(made([ball(material)], [EVERYWHERE], max_depth=12), GRID, 256)
-    np.testing.assert_allclose(view.mean(axis=(0, 1)), 1, atol=3e-3)
-
-
-@pytest.mark.parametrize("bits", [8, 16])
-def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int) -> None:
+@pytest.mark.parametrize(("bits", "field"), [(8, "metallic"), (16, "roughness"), (8, "clearcoat")])
+def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int, field: str) -> None:
     most = 2**bits - 1
     dark, bright = round(0.2 * most), round(0.8 * most)
     pixels = np.zeros((8, 8), np.uint8 if bits == 8 else np.uint16)
@@ -127,14 +123,13 @@ def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int) -> No
 
     def lit(finish: dict[str, Any]) -> np.ndarray:
         wall = card(400.0, 256.0, painted(finish))
-        return seen(made([wall], [EVERYWHERE, LAMP], folder=tmp_path), GRID, 1024)
+        return seen(made([wall], [EVERYWHERE, LAMP], folder=tmp_path), GRID, SAMPLES)
 
-    for field in ("metallic", "roughness", "clearcoat"):
-        both = lit({field: "numbers.png"})
-        # Away from the middle, where the image's two halves mix.
-        for half, value in ((np.s_[:, :12], dark / most), (np.s_[:, 20:], bright / most)):
-            alone = lit({field: value})
-            np.testing.assert_allclose(both[half].mean(axis=(0, 1)), alone[half].mean(axis=(0, 1)), rtol=3e-3)
+    both = lit({field: "numbers.png"})
+    # Away from the middle, where the image's two halves mix.
+    for half, value in ((np.s_[:, :12], dark / most), (np.s_[:, 20:], bright / most)):
+        alone = lit({field: value})
+        np.testing.assert_allclose(both[half].mean(axis=(0, 1)), alone[half].mean(axis=(0, 1)), rtol=4e-3)
 
 
 def test_a_coloured_image_of_numbers_is_named(tmp_path: Path) -> None:
@@ -146,7 +141,7 @@ def test_a_coloured_image_of_numbers_is_named(tmp_path: Path) -> None:
 def test_photons_are_those_of_the_dense_view() -> None:
     material = painted({"metallic": 0.3, "roughness": 0.3, "clearcoat": 0.5})
     built = made([ball(material), card(600.0, 300.0, material)], [EVERYWHERE, LAMP], max_depth=3)
-    view = seen(built, GRID, 512 if SCALAR else 8192)
-    gain = (10_000 if SCALAR else 200_000) / view.sum()
+    view = seen(built, GRID, 512 if SCALAR else 1024)
+    gain = (10_000 if SCALAR else 40_000) / view.sum()
     photons, _ = thinned(built, GRID, 3, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 5

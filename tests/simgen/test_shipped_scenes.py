@@ -2,6 +2,7 @@
 
 import importlib.util
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -56,6 +57,13 @@ def seen(name: str) -> tuple[FirstHits, list[FirstHits], dict[int, str]]:
     built = build(backend.load(), scene_of(name), ROOT / "scenes" / name, 3)
     corners = [first_hits_of_view(built, GRID, k, k) for k in (0, GRID.rows - 1)]
     return first_hits_at_centre(built, GRID), corners, dict(built.names)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def scenes_are_given_up() -> Iterator[None]:
+    """The renderer compiles its kernels anew where other scenes are in memory than in the last run."""
+    yield
+    seen.cache_clear()
 
 
 def script(file: Path) -> ModuleType:

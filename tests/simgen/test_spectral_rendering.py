@@ -96,16 +96,16 @@ def integrated(camera: str, lamp: str) -> np.ndarray:
 @pytest.mark.parametrize(("camera", "lamp"), list(zip(CAMERAS, ("D65", "A"), strict=True)))
 def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera: str, lamp: str) -> None:
     built, made = chart(lamp, camera)
-    grid, samples = made.grid.camera_grid(), 2048
+    grid, samples = made.grid.camera_grid(), 512
     view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=5).astype(np.float64)
     found, expected = by_patch(view), integrated(camera, lamp)
-    # Ratios to the green of the white patch, so that exposure does not matter. 131 000 paths a patch
-    # leave 0.07 to 0.3 % of noise.
+    # Ratios to the green of the white patch, so that exposure does not matter. 33 000 paths a patch
+    # leave 0.15 to 0.6 % of noise.
     found, expected = found / found[18, 1], expected / expected[18, 1]
-    np.testing.assert_allclose(found, expected, rtol=5e-3)
+    np.testing.assert_allclose(found, expected, rtol=0.01)
     # The fault: the other lamp's light.
     other = integrated(camera, {"D65": "A", "A": "D65"}[lamp])
-    assert (abs(found / (other / other[18, 1]) - 1) > 5e-3).mean() > 0.9
+    assert (abs(found / (other / other[18, 1]) - 1) > 0.01).mean() > 0.8
 
 
 @pytest.mark.parametrize("lamp", ["D65", "FL2"])
@@ -114,7 +114,7 @@ def test_thinned_photons_of_the_chart_are_those_of_spectral_integration(lamp: st
     grid, gain = made.grid.camera_grid(), capture_of(made, made.seed).photons_per_radiance
     assert gain is not None
     # A few hundred photons a patch one by one, or some thousand where that is cheap.
-    gain *= 0.05 if lit_views.SCALAR else 1.5
+    gain *= 0.05 if lit_views.SCALAR else 0.5
     photons, _ = lit_views.thinned(built, grid, 2, gain, seed=2)
     counts = np.zeros((grid.height, grid.width))
     np.add.at(counts, (photons.i, photons.j), 1)
@@ -140,7 +140,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     assert exposure is not None
     gain = capture_of(made, made.seed).photons_per_radiance
     assert gain is not None
-    view = render_view(built, grid, 0, 0, samples_per_pixel=512, seed=6).astype(np.float64)
+    view = render_view(built, grid, 0, 0, samples_per_pixel=256, seed=6).astype(np.float64)
     seen = by_patch(view)[21] * gain  # neutral 5
     per_lux = np.pi / (4 * F_NUMBER**2) * (PIXEL_MM * 1e-3) ** 2 * exposure.time_s / np.pi
     np.testing.assert_allclose(seen, photons_of_grey(camera) * per_lux * LUX, rtol=5e-3)
@@ -175,8 +175,8 @@ def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> 
     wall = {"z_mm": 1500.0, "reflectance": "blue sky"}
     built = lit_views.made([plastic, gold], lights, spectral=True, max_depth=3, backdrop=wall)
     grid = recipe(CAMERAS[0]).grid.camera_grid()
-    view = lit_views.seen(built, grid, 1024, seed=6) * lit_views.white(built)
-    gain = (2e4 if lit_views.SCALAR else 2e5) / mosaic(view, "GRBG").sum()
+    view = lit_views.seen(built, grid, 256, seed=6) * lit_views.white(built)
+    gain = (2e4 if lit_views.SCALAR else 4e4) / mosaic(view, "GRBG").sum()
     photons, log = lit_views.thinned(built, grid, 3, gain, seed=3)
     assert abs(lit_views.surprise(photons, view, grid, gain, block_px=6)) < 5
     assert log["paths_above_bound"] <= max(1e-3 * photons.k.size, 3)

@@ -29,7 +29,7 @@ def sparse(grid: pcii.CameraGrid, photons: int, cfa: str | None = None) -> pcii.
     ("size", "cfa"),
     mostly_slow(
         product([(1, 1), (1, 2), (2, 1), (1, 17), (3, 3), (8, 8), (13, 64)], [None, "BGGR"]),
-        quick=[((1, 1), None), ((1, 2), "BGGR"), ((2, 1), None), ((1, 17), "BGGR"), ((13, 64), "BGGR")],
+        quick=[((1, 1), None), ((1, 17), "BGGR"), ((13, 64), "BGGR")],
     ),
 )
 def test_every_method_answers_on_films_of_any_size(size: tuple[int, int], cfa: str | None) -> None:

@@ -8,7 +8,6 @@ from rational_sections import samples_of, variance_of
 from twins import Reader, blocky_texture, patch_views, unit_grid
 
 import pcii
-from pcii.sections.photon_statistics import entropy_bits
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)
@@ -173,12 +172,6 @@ def test_demosaicing_gives_finite_colours_or_refuses(value: float, shape: tuple[
         assert value > 1e307
         return
     np.testing.assert_allclose(image, value, rtol=1e-12, atol=1e-322)
-
-
-@pytest.mark.parametrize("top", [5e-324, 1e-300, 1.0, 1e308])
-def test_entropy_knows_no_unit(top: float) -> None:
-    values = np.array([0.0, 0.0, top, top])
-    assert entropy_bits(values, top) == 1.0
 
 
 # Depth does not depend on the unit of radiance

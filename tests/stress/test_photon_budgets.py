@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from rational_sections import samples_of, variance_of
-from twins import even_light, unit_grid
+from twins import unit_grid
 
 import pcii
 from pcii.sections.photon_statistics import view_samples
@@ -78,12 +78,6 @@ def test_a_pixel_holds_2_to_the_40_photons_however_they_come() -> None:
         pcii.PhotonCounts.from_events(zero, zero, zero, zero, np.array([LARGEST_COUNT, 1]), grid)
     with pytest.raises(pcii.InputError, match=r"^counts: more than 2\^40 photons in a pixel"):
         pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), LARGEST_COUNT + 1), grid)
-
-
-@pytest.mark.parametrize("most", [-1, np.nan, -np.inf])
-def test_fewer_than_no_photons_cannot_be_kept(most: float) -> None:
-    with pytest.raises(pcii.InputError, match=r"^most: "):
-        even_light(unit_grid(1, 1, 4, 4), 1.0, seed=0).subsample(most, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint32, np.uint64, np.float32, ">i4"])

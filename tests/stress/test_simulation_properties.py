@@ -3,30 +3,24 @@
 import numpy as np
 import pytest
 from camera_grids import grids
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from twins import unit_grid
 
-from pcii.base.errors import InputError
-from pcii.types import geometry
 from pcii.types.bayer import PATTERNS, channel_count
 from pcii.types.camera_grid import CameraGrid
-from simgen.base import random_streams
-from simgen.base.strict_models import validate
 from simgen.cameras import disparities
 from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.scopes import places
 from simgen.sensor.detector import (
-    detect,
     draw_counts,
     fixed_totals,
     full_light_image,
     nested_subset,
-    read_out,
 )
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import FullLight, Grid, Lens, Photons, Sensor
+from simgen.spec.recipe import FullLight, Lens, Photons, Sensor
 
 GRID = unit_grid(2, 2, 4, 5)
 SEEDS = st.integers(0, 2**63 - 1)
@@ -49,24 +43,6 @@ def film_of(table: PhotonTable) -> np.ndarray:
 
 
 # The sensor
-
-
-@given(SEEDS, st.integers(0, 60), st.tuples(*[st.floats(1e-3, 1)] * 3), SHARES)
-def test_a_detector_that_adds_nothing_detects_no_more_than_arrives(seed, number, efficiency, dead) -> None:
-    sensor = Sensor(quantum_efficiency=efficiency, dead_pixel_share=dead)
-    arrivals = photons_of(seed, number, 9)
-    counts = detect(arrivals, GRID, "GRBG", sensor, seed)
-    assert (film_of(counts) <= film_of(arrivals)).all()
-    assert (counts.n > 0).all()
-    whole = detect(arrivals, GRID, "GRBG", Sensor(), seed)
-    np.testing.assert_array_equal(film_of(whole), film_of(arrivals))
-
-
-@given(SEEDS, st.integers(0, 60), st.integers(1, 32), st.sampled_from([1, 50, 2**40]))
-def test_a_counter_stops_at_its_largest_number(seed: int, number: int, bits: int, most: int) -> None:
-    arrivals = photons_of(seed, number, most)
-    stopped = read_out(arrivals, GRID, Sensor(bits=bits), seed)
-    np.testing.assert_array_equal(film_of(stopped), np.minimum(film_of(arrivals), 2**bits - 1))
 
 
 @given(SEEDS, st.integers(1, 80), st.integers(1, 5), st.data())
@@ -125,14 +101,6 @@ def test_full_light_is_finite_and_no_brighter_than_the_full_well(
 # Cameras
 
 
-@given(grids, st.floats(1.0, 1e6))
-def test_both_packages_see_the_same_disparity(grid: CameraGrid, z_mm: float) -> None:
-    np.testing.assert_allclose(
-        disparities.disparities_px(grid, z_mm), geometry.disparity_px(grid, z_mm), rtol=1e-12, atol=1e-9
-    )
-    assert disparities.spread_px_mm(grid) / z_mm == pytest.approx(geometry.total_disparity_px(grid, z_mm))
-
-
 @given(grids, st.floats(1.0, 1e6), st.sampled_from([*PATTERNS, None]))
 def test_every_camera_gives_each_voxel_one_colour(grid: CameraGrid, z_mm: float, cfa: str | None) -> None:
     found = disparities.colour_samples(grid, cfa, z_mm)
@@ -174,43 +142,7 @@ def test_points_of_the_film_are_on_the_film(grid: CameraGrid, number: int, seed:
     assert number / 2 - 1 <= view.size <= 2 * number + 1
 
 
-@given(SEEDS, st.integers(0, 2**31), st.integers(0, 2**31))
-def test_streams_differ_by_every_part_of_their_key(seed: int, view: int, part: int) -> None:
-    assume(view != part)
-    stage = "photons"
-
-    def first(**key: int) -> int:
-        return int(random_streams.generator(seed, stage=stage, **key).integers(2**63))
-
-    assert first(view=view, part=part) == first(view=view, part=part)
-    assert (
-        len({first(view=view, part=part), first(view=part, part=view), first(view=view, part=part + 1)}) == 3
-    )
-
-
 # What people write
-
-
-@given(
-    st.fixed_dictionaries(
-        {},
-        optional={
-            "rows": st.integers(-2, 5),
-            "focal_mm": st.one_of(st.floats(), st.text(max_size=2)),
-            "pixel_mm": st.floats(),
-            "pitch_mm": st.lists(st.floats(), min_size=1, max_size=3),
-            "shear_px": st.tuples(st.floats(), st.floats()).map(list),
-            "colour": st.none(),
-        },
-    )
-)
-def test_a_grid_is_what_pcii_takes_or_is_refused(values: dict) -> None:
-    try:
-        grid = validate(Grid, values, "recipe")
-    except InputError as fault:
-        assert str(fault).startswith("recipe: ")  # noqa: PT017
-        return
-    assert grid.camera_grid().rows == grid.rows
 
 
 @given(grids, st.floats(1, 50), st.integers(1, 8))

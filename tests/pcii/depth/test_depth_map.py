@@ -41,22 +41,22 @@ def test_depths_of_the_squares_are_right(depth, two_squares, plane):
     assert (errors < 2.0).mean() > 0.9
 
 
-@pytest.mark.parametrize("plane", [0, 1])
 @pytest.mark.parametrize("beyond", [0.7, 1.0])
-def test_depths_between_planes_are_distinguished(two_squares, plane, beyond):
+def test_depths_between_planes_are_distinguished(two_squares, beyond):
     # Planes at 6.7, 8.7, ... px of total disparity, or 7, 9, ...: 0.7 or 1 px from the truth, 18 and 42 px.
     shifted = (6 / (54 + beyond), 6 / (6 + beyond))
-    errors = disparity_errors_px(estimate_depth(two_squares.counts, shifted), two_squares, plane)
+    depth = estimate_depth(two_squares.counts, shifted)
     # Shifts are whole pixels, so that planes up to 1 px from the truth may be the same section; the
     # planes beside them differ. Without the parabola it would be 0.7 or 1, with its sign reversed more.
-    assert np.median(errors) < 0.5
+    for plane in (0, 1):
+        assert np.median(disparity_errors_px(depth, two_squares, plane)) < 0.5
 
 
-@pytest.mark.parametrize("plane", [0, 1])
-def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
+def test_cameras_in_the_wrong_order_do_not_pass(two_squares):
     flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
-    errors = disparity_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
-    assert np.median(errors) > 0.5
+    depth = estimate_depth(flipped, RANGE_MM)
+    for plane in (0, 1):
+        assert np.median(disparity_errors_px(depth, two_squares, plane)) > 0.5
 
 
 def test_the_dark_has_no_depth(depth, two_squares):
@@ -83,7 +83,7 @@ def test_depths_that_look_alike_share_the_probability():
     ]
     probabilities = []
     method = PosteriorDepth()
-    for seed in (3, 4, 5):
+    for seed in (3, 4):
         film = np.random.default_rng(seed).poisson(0.1 * np.array(views))
         counts = PhotonCounts.from_dense(film, unit_grid(7, 7, 96, 96))
         # Of the smooth surface and of the network; at first only one of the depths is in the range.
@@ -97,7 +97,7 @@ def test_depths_that_look_alike_share_the_probability():
                 method.posterior(counts, z_range_mm),
             ):
                 probabilities.append(np.median(posterior.most_probable()[1]))
-    sure, sure_network, unsure, unsure_network = np.mean(np.reshape(probabilities, (3, 4)), axis=0)
+    sure, sure_network, unsure, unsure_network = np.mean(np.reshape(probabilities, (2, 4)), axis=0)
     assert sure > 0.9
     assert unsure < 0.8  # each of the three has a third, if neighbours were independent of each other
     assert unsure_network < sure_network - 0.1  # of patterns that it has not seen the network is less sure
@@ -116,7 +116,7 @@ def flat_share(rate: float, films: int) -> float:
 # From 0.2 to 50 photons in each pixel of a section.
 @pytest.mark.parametrize("rate", mostly_slow([0.004, 0.02, 0.1, 1.0], quick=[0.004, 1.0]))
 def test_a_flat_film_has_no_depth(rate):
-    assert flat_share(rate, films=4) <= 1 / 1000  # what is promised
+    assert flat_share(rate, films=2) <= 1 / 1000  # what is promised
 
 
 def slanted_card(grid: CameraGrid, near: float, far: float, seed: int) -> PhotonCounts:

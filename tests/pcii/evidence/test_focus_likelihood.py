@@ -147,7 +147,7 @@ def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin
 @pytest.mark.parametrize(("cfa", "disparity"), [("GRBG", 2), ("BGGR", 3.4), (None, 3.4)])
 def test_gains_are_those_of_all_other_photons(cfa, disparity):
     # Landing 16 px or more from the frame, between the centres of the widest blocks (see the next test).
-    counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=40, seed=3, margin=20)
+    counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=30, seed=3, margin=20)
     focus = focus_evidence(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
     # Sums of gains are kept in single precision: a few roundings of 6e-8 each.
@@ -194,12 +194,12 @@ def flat_gains(rate: float, scenes: int, cfa: str | None = "GRBG", size: int = 1
     return np.array([flat_gain(rate, seed, cfa, size) for seed in range(scenes)])
 
 
-RATES = [1e-5, 1e-4, 0.01, 0.2, 2.0]  # from one photon in 64 x 64 px of the section to 50 in each
+RATES = [1e-5, 0.01, 2.0]  # from one photon in 64 x 64 px of the section to 50 in each
 
 
 @pytest.mark.parametrize(("rate", "cfa"), [*((rate, "GRBG") for rate in RATES), (0.2, None)])
 def test_a_flat_film_gains_nothing_on_average(rate, cfa):
-    totals = flat_gains(rate, scenes=24, cfa=cfa).sum(axis=(1, 2), dtype=np.float64)
+    totals = flat_gains(rate, scenes=12, cfa=cfa).sum(axis=(1, 2), dtype=np.float64)
     assert totals.mean() < 4 * totals.std() / math.sqrt(totals.size)
 
 
@@ -214,8 +214,8 @@ def large_gains(gains: np.ndarray) -> float:
 def test_a_region_of_a_flat_film_exceeds_log_20_about_once_in_20_times(rate):
     # Were e^gain 1 on average it would exceed 20 once in 20 times at most (Markov). It is not quite: photons
     # predict each other, so that what happens to lie together counts twice, and at 50 photons a pixel of
-    # the section 1 region in 20 exceeds it. 160 regions at 1/20 show that +- 0.017; three times that.
-    assert large_gains(flat_gains(rate, scenes=40)) < 1 / 20 + 0.052
+    # the section 1 region in 20 exceeds it. 80 regions at 1/20 show that +- 0.024; three times that.
+    assert large_gains(flat_gains(rate, scenes=20)) < 1 / 20 + 0.073
 
 
 def test_photons_in_pairs_are_seen():
@@ -250,7 +250,7 @@ def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
 @pytest.mark.parametrize("rate", [0.01, 10.0])
 def test_no_bias_at_the_frame_of_a_flat_film(rate, cfa):
     # Views leave the frame there: blocks are covered by fewer views, and unequally.
-    gains = flat_gains(rate, scenes=24, cfa=cfa, size=96)
+    gains = flat_gains(rate, scenes=12, cfa=cfa, size=96)
     edge = np.ones(gains.shape[1:], dtype=bool)
     edge[2:-2, 2:-2] = False  # 8 px, to which the farthest view shifts by 6
     for frame in (edge, ~edge):

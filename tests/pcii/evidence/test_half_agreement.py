@@ -53,13 +53,13 @@ def test_what_one_camera_alone_shows_is_not_agreed_on():
     ("rate", "views"),
     mostly_slow(
         product((0.003, 0.1, 1.0, 1e4), ((2, 1), (3, 4))),
-        quick=[(0.003, (3, 4)), (1.0, (2, 1)), (1e4, (3, 4))],
+        quick=[(0.003, (3, 4)), (1.0, (2, 1))],
     ),
 )
 def test_noise_agrees_as_seldom_as_is_said(rate, views):
     grid = unit_grid(*views, 64, 80)
     above = []
-    for seed in range(20):
+    for seed in range(10):
         halves = halves_of(even_light(grid, rate, seed), planes_of(grid), out_of_focus=True)
         above.append(np.any([at(halves, plane, (16, 20)) for plane in range(6)], axis=0).mean())
     assert np.mean(above) <= 1 / 1000  # of places, as is said

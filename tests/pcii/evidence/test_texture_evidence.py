@@ -11,8 +11,8 @@ from pcii.types.images import Views
 UNBOUNDED = TextureModel(averaging_error=0.0, saturation_nats=1e12)
 
 
-@pytest.mark.parametrize("octaves", [1, 2, 3, 4])
-@pytest.mark.parametrize("rate", [0.05, 1.0, 100.0])
+@pytest.mark.parametrize("octaves", [1, 4])
+@pytest.mark.parametrize("rate", [0.05, 100.0])
 @pytest.mark.parametrize("cfa", ["GRBG", None])
 def test_noise_has_none_on_average(cfa: str | None, rate: float, octaves: int) -> None:
     grid = unit_grid(4, 4, 256, 256)

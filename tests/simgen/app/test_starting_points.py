@@ -32,7 +32,6 @@ def test_a_scene_and_a_recipe_work_as_they_are_written() -> None:
         assert not [finding.line() for finding in findings if finding.verdict in ("bad", "warn")]
     text = Path("data_recipes/mine.toml").read_text()
     assert "generate data_recipes/mine.toml -o out/mine" in text
-    run("preview mine -o mine.png --samples-per-pixel 1")
     smaller = "--set grid.rows=2 --set grid.cols=2 --set grid.height=32 --set grid.width=32"
     run(f"generate data_recipes/mine.toml -o out/mine {smaller} --set render.samples_per_pixel=1")
     assert verify(Path("out/mine")) > 0

@@ -243,7 +243,7 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
 
     def rates(cameras: Cameras) -> np.ndarray:
         views = [
-            render_view(scene, cameras, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
+            render_view(scene, cameras, k, l, samples_per_pixel=256, seed=7 + 2 * k + l)
             for k, l in np.ndindex(2, 2)
         ]
         radiance = mosaic(np.stack(views).astype(np.float64), "GRBG")

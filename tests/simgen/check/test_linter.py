@@ -13,12 +13,12 @@ from pcii.base import command_line
 from simgen.app import commands as cli
 from simgen.cameras.disparities import apart_px, disparities_px
 from simgen.check.depths import depth_findings, focus_share
-from simgen.check.light import cost_findings, in_time, photon_findings, photons_per_view, seconds
+from simgen.check.light import cost_findings, photon_findings, photons_per_view, seconds
 from simgen.check.scene_probe import Facts, Finding, ObjectFacts, coarser, probe_scene
 from simgen.check.sight import sight_findings
 from simgen.check.targets import findings
 from simgen.dataset.prepared import Prepared
-from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes
+from simgen.dataset.resources import peak_bytes, product_bytes
 from simgen.photons.counting_plan import Plan
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
@@ -96,11 +96,6 @@ def test_too_little_disparity_and_too_much(z_mm: tuple[float, float], verdict: s
     (finding,) = about("disparity", depth_findings(facts(thing("a", *z_mm))))
     assert finding.verdict == verdict
     assert words in finding.text
-
-
-def test_one_camera_has_no_disparity_to_speak_of() -> None:
-    found = depth_findings(facts(thing("a", 540), recipe={"grid": {"rows": 1, "cols": 1}}))
-    assert verdicts(found) == ["ok"]
 
 
 def test_share_in_focus_is_what_blurs_by_one_pixel() -> None:
@@ -231,11 +226,6 @@ def test_saturation_is_that_of_the_brightest_object() -> None:
     assert (many.verdict, one.verdict) == ("ok", "warn")
 
 
-def test_without_counts_or_light_there_is_nothing_to_say_of_photons() -> None:
-    assert photon_findings(facts(thing("a", 540), plan=None)) == []
-    assert photon_findings(facts(thing("a", 540), luminance=0.0)) == []
-
-
 def test_sizes_memory_and_time_by_hand() -> None:
     recipe = {"products": {"radiance": "mosaic", "view_truth": True}, "render": {"samples_per_pixel": 2}}
     known, pixels = facts(recipe=recipe), 1024**2
@@ -254,11 +244,6 @@ def test_sizes_memory_and_time_by_hand() -> None:
     # A view's first hits take 165 B a pixel, 173 MB of 1024 x 1024.
     for room, verdict in ((170e6, "bad"), (180e6, "ok")):
         assert verdicts(cost_findings(facts(memory_bytes=room))) == ["ok", verdict, "ok"]
-
-
-def test_sizes_and_times_read_well() -> None:
-    assert [in_bytes(n) for n in (0, 1500, 419_430_400)] == ["0 B", "1.5 kB", "420 MB"]
-    assert [in_time(s) for s in (0.01, 260, 1e6)] == ["1 s", "4 minutes", "10 days"]
 
 
 GRID = {"rows": 2, "cols": 2, "pitch_mm": [10.0, 10.0], "pixel_mm": 0.8, "height": 64, "width": 64}
@@ -318,7 +303,6 @@ def test_a_camera_inside_an_object_and_a_scene_in_the_dark() -> None:
     dark = probed([ball("a", 0, 500, GREY)], lamp)
     assert dark.luminance == 0
     assert "bad" in verdicts(about("lights", findings(dark)))
-    assert probed([ball("a", 0, 500, GREY)], lamp | {"target_mm": (0, 0, 500)}).luminance > 0
 
 
 def test_a_coarser_film_has_the_same_field_of_view() -> None:
@@ -337,8 +321,6 @@ def test_the_small_recipe_passes(capsys: pytest.CaptureFixture[str]) -> None:
     # Its shifts at 540 mm are multiples of 12 px but for rounding: -30, -18, -6, 6, 18, 30.
     assert {row["subject"] for row in rows if row["verdict"] != "ok"} == {"colours"}
     assert any("ball (5" in row["text"] and "7.6" in row["text"] for row in rows)
-    assert command_line.run(cli.app, ["check", "two_objects"]) == 0
-    assert "10 x 10 views" in capsys.readouterr().out
 
 
 @pytest.mark.renders
@@ -356,11 +338,10 @@ type = "uniform"
 luminance_cd_m2 = 10
 """
     file.write_text(text)
-    for target in (tmp_path, file):
-        assert command_line.run(cli.app, ["check", str(target)]) == 1
-        output = capsys.readouterr()
-        assert "lost is at z = -520 to -480 mm" in output.out
-        assert output.err == ""
+    assert command_line.run(cli.app, ["check", str(file)]) == 1
+    output = capsys.readouterr()
+    assert "lost is at z = -520 to -480 mm" in output.out
+    assert output.err == ""
     file.write_text(text.replace("radius_mm", "radius"))
     for target, words in ((tmp_path, "radius"), ("nowhere", "there is no scene or recipe 'nowhere'")):
         assert command_line.run(cli.app, ["check", str(target)]) == 2

@@ -13,6 +13,7 @@ from tiny import GRID_2_X_3
 from pcii.base import command_line
 from pcii.base.errors import InputError, WorkerLostError
 from pcii.base.executor import Executor
+from pcii.base.safe_files import locked
 from pcii.store import software
 from pcii.store.collection import COLLECTION, INDEX, open_collection
 from pcii.store.dataset_layout import CARD, MARKER
@@ -103,7 +104,7 @@ def test_a_dataset_that_cannot_be_made_holds_up_no_other(
     assert command_line.run(cli.app, command) == 0
     (out / "seed_8").mkdir()
     (out / "seed_8" / "notes.txt").write_text("mine")
-    assert command_line.run(cli.app, [*command[:-1], "3", "--workers", "2"]) == 1
+    assert command_line.run(cli.app, [*command[:-1], "3"]) == 1
     output = capsys.readouterr()
     assert "2 of 3 datasets are finished" in output.out
     assert "seed_8: holds something else" in output.err
@@ -118,6 +119,14 @@ def test_a_sweep_that_made_nothing_gives_way_to_the_one_that_was_meant(
     meant = load_sweep(str(recipe_file), [*drawn, "scene_number=3"])
     assert generate_collection(meant, tmp_path / "out") == []
     assert [row["scene_number"] for row in open_collection(tmp_path / "out").rows] == [3, 3]
+
+
+def test_a_collection_that_another_run_writes_is_refused(recipe_file: Path, tmp_path: Path) -> None:
+    with (
+        locked(tmp_path / dataset_collection.LOCK, wait=False),
+        pytest.raises(InputError, match="another run is writing this collection"),
+    ):
+        generate_collection(sweep_of(recipe_file), tmp_path)
 
 
 def test_another_recipe_a_dataset_and_a_file_are_refused(
@@ -193,5 +202,5 @@ def test_the_same_command_goes_on_to_the_same_bytes_after_a_worker_was_killed(
         generate_collection(sweep_of(recipe_file), out, Executor(workers=2))
     killer.join(timeout=10)
     assert killed
-    assert generate_collection(sweep_of(recipe_file), out, Executor(workers=2)) == []
+    assert generate_collection(sweep_of(recipe_file), out) == []
     assert digest_of_all(out) == digest_of_all(collection)

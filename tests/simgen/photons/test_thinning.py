@@ -1,5 +1,6 @@
 """Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,9 +31,9 @@ from simgen.truth.first_hits import first_hits_of_view
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"
 # A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
-DRAWS = 40 if COMPILED else 25
-MANY = 400_000 if COMPILED else 50_000
-COLOUR_BIAS = 0.01 if COMPILED else 0.05
+DRAWS = 25
+MANY = 100_000 if COMPILED else 50_000
+COLOUR_BIAS = 0.03 if COMPILED else 0.05
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
 
 
@@ -43,9 +44,9 @@ def scene() -> RenderScene:
 
 @pytest.fixture(scope="module")
 def radiance(scene: RenderScene) -> np.ndarray:
-    """Mosaics (V, H, W) from 2048 samples per pixel: good to about 1.4 % per pixel, 0.14 % per tile."""
+    """Mosaics (V, H, W) from 1024 samples per pixel: good to about 2 % per pixel, 0.2 % per tile."""
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
@@ -55,15 +56,22 @@ def setup_of(scene: RenderScene) -> Setup:
     return Setup(scene, GRID, "GRBG", DEPTH)
 
 
-found_out: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+explorations: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def scenes_are_given_up() -> Iterator[None]:
+    """The renderer compiles its kernels anew where other scenes are in memory than in the last run."""
+    yield
+    explorations.clear()
 
 
 def explored(scene: RenderScene, settings: Photons) -> Exploration:
     """It is the same for all seeds, and takes longer than a draw of few photons."""
     key = id(scene), settings.model_dump_json()
-    if key not in found_out:
-        found_out[key] = scene, explore(setup_of(scene), settings)
-    return found_out[key][1]
+    if key not in explorations:
+        explorations[key] = scene, explore(setup_of(scene), settings)
+    return explorations[key][1]
 
 
 def draw_with_log(scene: RenderScene, seed: int, **photons: object) -> tuple[PhotonTable, dict[str, Any]]:
@@ -166,8 +174,8 @@ def colour_p_value(found: np.ndarray, radiance: np.ndarray, bias: np.ndarray) ->
     """Of a chi-square test with two degrees of freedom of photons (3,) against biased colours."""
     share = np.array([rates_of(radiance, 1.0)[:, colour_of_pixel == c].sum() for c in range(3)]) * bias
     expected = found.sum() * share / share.sum()
-    # The reference is good to 0.03 % of a colour, which adds a third to the variance of 1.6 million.
-    square = ((found - expected) ** 2 / expected).sum() / (1 + MANY / 1_250_000)
+    # The reference is good to 0.04 % of a colour, which adds half to the variance of 1.6 million photons.
+    square = ((found - expected) ** 2 / expected).sum() / (1 + MANY / 800_000)
     return float(stats.chi2.sf(square, 2))
 
 
@@ -179,7 +187,7 @@ def biased(colour: int) -> np.ndarray:
     return np.where(np.arange(3) == colour, 1 + COLOUR_BIAS, 1.0)
 
 
-def test_colours_are_true_to_a_percent(scene: RenderScene, radiance: np.ndarray) -> None:
+def test_colours_are_true_to_three_percent(scene: RenderScene, radiance: np.ndarray) -> None:
     found = photons_by_colour(scene, 3)
     assert colour_p_value(found, radiance, UNBIASED) > 1e-3
     assert colour_p_value(found, radiance, biased(0)) < 1e-3
@@ -265,11 +273,11 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
     scene = lit([plastic, gold], [lamp, EVENLY])
-    budget = 15_000 if COMPILED else 6000
+    budget = 10_000 if COMPILED else 6000
     drawn, log = draw_with_log(scene, 1, budget=budget)
     assert log["paths_above_bound"] <= 1e-2 * log["kept"]
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=3 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
@@ -320,7 +328,7 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
     counts = counted(draw(scene, 1, budget=30_000))
     # Stripes' edges vary most within pixels: with fewer samples the rates' own noise would show.
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 30_000.0)
@@ -348,14 +356,14 @@ def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
         "luminance_cd_m2": 1e6,
     }
     scene = lit([ball("grey", -150.0, 600.0, (0.5, 0.5, 0.5))], [lamp])
-    drawn, log = draw_with_log(scene, 10, budget=10_000 if COMPILED else 4000)
+    drawn, log = draw_with_log(scene, 10, budget=4000)
     assert log["paths_above_bound"] <= max(1e-3 * log["kept"], 3)
-    view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=4096, seed=1).astype(float), "GRBG")
+    view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=2048, seed=1).astype(float), "GRBG")
     share = view / view.sum()
     peak = share > 0.01
     counts = counted(drawn)[0]
     n, p = counts.sum(), share[peak].sum()
-    # The lamp's edges cross pixels, whose reference is good to 1 / sqrt(4096) of them.
+    # The lamp's edges cross pixels, whose reference is good to 1 / sqrt(2048) of them.
     assert abs(counts[peak].sum() / n - p) < 4 * np.sqrt(p * (1 - p) / n) + 0.005
 
 
@@ -402,10 +410,10 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         expected = on_tiles(rates_of(radiance, MANY / 20) if gain is None else gain * radiance)
         found = on_tiles(counted(drawn))
         seen = expected > 5
-        # The reference is good to 0.14 % of a tile.
+        # The reference is good to 0.2 % of a tile.
         return float(
             stats.chi2.sf(
-                ((found - expected)[seen] ** 2 / (expected + (0.0014 * expected) ** 2)[seen]).sum(),
+                ((found - expected)[seen] ** 2 / (expected + (0.002 * expected) ** 2)[seen]).sum(),
                 seen.sum(),
             )
         )
@@ -484,11 +492,3 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
         made = plan(capture, setup, backend.choose().kind)
         assert (made.thins, bool(made.why_rendered)) == (is_bounded, not is_bounded)
         assert made.noise <= MAX_NOISE_SHARE
-
-
-def test_photons_per_radiance_are_asked_for_with_an_exposure_and_no_budget(scene: RenderScene) -> None:
-    setup = Setup(scene, GRID, "GRBG", DEPTH)
-    with pytest.raises(ValueError, match="photons_per_radiance: needed"):
-        thin_photons(setup, Photons(scope="exposure"), seed=1)
-    with pytest.raises(ValueError, match="and for no others"):
-        thin_photons(setup, Photons(budget=10), seed=1, photons_per_radiance=0.1)

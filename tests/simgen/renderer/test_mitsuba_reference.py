@@ -12,7 +12,7 @@ from pcii.base.errors import InputError
 from pcii.types.camera_grid import CameraGrid
 from simgen.renderer import backend
 
-SIDE, TILES, REPEATS, SAMPLES, DEPTH = 64, 8, 6, 64, 5
+SIDE, TILES, REPEATS, SAMPLES, DEPTH = 48, 8, 6, 48, 5
 ANGLE_DEG, FOCAL_MM = 35.0, 50.0
 GRID = CameraGrid(
     rows=1,
@@ -112,7 +112,7 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
     folder: Path, content: str, names: set[str], is_thinned: bool
 ) -> None:
     scene = scene_of(folder, CAMERA + ROOM + content)
-    counts, truth = simgen.draw_photons(scene, GRID, budget=20_000, cfa=None, seed=1, max_depth=DEPTH)
+    counts, truth = simgen.draw_photons(scene, GRID, budget=10_000, cfa=None, seed=1, max_depth=DEPTH)
     ours = tiles_of(
         [
             simgen.render(scene, GRID, samples_per_pixel=SAMPLES, max_depth=DEPTH, seed=seed).view(0, 0)
@@ -129,7 +129,7 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
     z = (ours.mean(axis=0) - theirs.mean(axis=0)) / error
     # Of Student's distribution with 10 degrees of freedom the mean square is 1.25, of 192 values to 15 %.
     assert (z**2).mean() < 1.8
-    assert abs(ours.mean() / theirs.mean() - 1) < 0.005
+    assert abs(ours.mean() / theirs.mean() - 1) < 0.01
     assert (truth.photons is not None) == is_thinned
     assert set(truth.names.values()) == {"floor", "back", "lamp"} | names
     luminance = theirs.mean(axis=0) @ [0.2126, 0.7152, 0.0722]

@@ -202,12 +202,6 @@ def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
     assert bits == 32 or (wrong != expected).any()
 
 
-def test_a_counter_of_32_bits_stops_at_four_thousand_million() -> None:
-    zero = np.zeros(1, dtype=np.int64)
-    many = PhotonTable(zero, zero, zero, zero, np.array([1 << 33]))
-    assert read_out(many, TEN, Sensor(bits=32), seed=1).n.tolist() == [2**32 - 1]
-
-
 def companions(n: list[int]) -> PhotonTable:
     """In each of 4096 pixels some counts of each object, n[0] of object 1 and so on; in this order."""
     pixels = films(1, 1, 64, 64)

@@ -8,7 +8,7 @@ from scipy import stats
 
 from pcii.types.camera_grid import CameraGrid
 from simgen.sensor import detector
-from simgen.sensor.detector import counts_of, in_frames, read_out
+from simgen.sensor.detector import counts_of, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Sensor
 
@@ -111,11 +111,6 @@ def test_parts_of_the_work_are_one_draw(monkeypatch: pytest.MonkeyPatch) -> None
     assert is_binomial(sums(read), 16, -np.expm1(-2.0 / 16))
 
 
-def test_far_more_photons_than_frames_take_no_longer_than_frames() -> None:
-    arrivals = arriving(np.full(PIXELS, 1 << 40) * (np.arange(PIXELS) < 3), known=False)
-    assert read_out(arrivals, FILM, Sensor(frames=100, bits=2), seed=1).n.tolist() == [300, 300, 300]
-
-
 def test_counts_know_their_frames_in_the_order_of_their_events() -> None:
     sensor = Sensor(frames=9, bits=2)
     read = read_out(poisson(4.0, known=True), FILM, sensor, seed=1, keeps_frames=True)
@@ -130,9 +125,3 @@ def test_counts_know_their_frames_in_the_order_of_their_events() -> None:
     # Origins are written in this order, too.
     assert read.object_id is not None
     np.testing.assert_array_equal(read.object_id, e.i % 7)
-
-
-def test_no_photons_have_no_frames() -> None:
-    nothing = arriving(np.zeros(PIXELS, np.int64), known=False)
-    assert read_out(nothing, FILM, Sensor(frames=5, bits=1), 1, keeps_frames=True).k.size == 0
-    assert in_frames(arriving(np.zeros(PIXELS, np.int64), known=True), Sensor(frames=5), 1).k.size == 0

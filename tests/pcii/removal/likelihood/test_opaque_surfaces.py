@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-import pytest
 from twins import blocky_texture, intersection_over_union, opaque_views, photons_of, unit_grid
 
 from pcii import PhotonCounts, segment
@@ -40,10 +39,9 @@ def bar_before_card(per_view: float, seed: int = 0) -> Seen:
     return Seen(counts, [1 / 4, 1 / 8], [rectangle(40, 40, 176, 176) & ~bar, bar])
 
 
-@pytest.mark.parametrize("per_view", [300, 2000])
-def test_a_bar_is_told_from_the_card_that_cameras_see_past_it(per_view):
+def test_a_bar_is_told_from_the_card_that_cameras_see_past_it():
     # 2 px off all along both sides of the bar, half of a cell of evidence: 36 / 40.
-    assert min(agreement(bar_before_card(per_view))) > 0.9
+    assert min(agreement(bar_before_card(300))) > 0.9
 
 
 def card_before_card(per_view: float, seed: int, *, nearer: bool = True) -> Seen:
@@ -62,14 +60,13 @@ def card_before_card(per_view: float, seed: int, *, nearer: bool = True) -> Seen
 def test_a_card_is_told_from_the_one_before_it():
     # Where a square of 40 px at the nearer card's border is as dark as the one behind it nothing tells them
     # apart: of the nine squares that it covers all or in part one more or less is a tenth, two are a fifth.
-    found = np.mean([agreement(card_before_card(150, seed)) for seed in (1, 2, 3, 4)], axis=0)
+    found = np.mean([agreement(card_before_card(150, seed)) for seed in (1, 2)], axis=0)
     assert min(found) > 0.7
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_piece_that_stands_out_stays_at_its_depth(seed):
+def test_a_piece_that_stands_out_stays_at_its_depth():
     # Told by itself each of its squares saves something, at the depth of the other plane as well.
-    scene = card_before_card(300, seed, nearer=False)
+    scene = card_before_card(300, 1, nearer=False)
     card = scene.masks[0]
     far, near = segment(scene.counts, scene.z_mm, method="likelihood").in_focus
     assert intersection_over_union(far, card) > 0.9

@@ -287,13 +287,13 @@ def test_of_few_photons_the_evidence_itself_counts(elsewhere):
 @pytest.mark.parametrize("photons_per_px", mostly_slow([0.02, 0.1, 1.0], quick=[0.1]))
 def test_noise_alone_is_never_sure(photons_per_px):
     # The whole of a film on which nothing is: about a hundred nats of noise at each of 11 depths that may be
-    # a plane's. Five films are at most 55 trials, of which e^-10 is not one.
+    # a plane's. Three films are at most 33 trials, of which e^-10 is not one.
     size, total_disparity_px = 256, np.arange(60.0, 140.0, 2.0)
     away = np.abs(total_disparity_px - 100)
     planes = Planes(total_disparity_px, np.zeros(away.size, np.int64), away, sure=away <= 4.5, far_px=10.0)
     everything = np.ones((size // 4, size // 4), dtype=bool)
     grid = paper_grid(size, size)
-    for seed in range(5):
+    for seed in range(3):
         counts = even_light(grid, photons_per_px / 100, seed, "GRBG")
         searched = FocalPlanes.at_total_disparity(counts.grid, total_disparity_px)
         focus, halves = focus_evidence(counts, searched), halves_of(counts, searched)
