@@ -124,7 +124,7 @@ def test_a_sweep_that_made_nothing_gives_way_to_the_one_that_was_meant(
 def test_a_collection_that_another_run_writes_is_refused(recipe_file: Path, tmp_path: Path) -> None:
     with (
         locked(tmp_path / dataset_collection.LOCK, tmp_path),
-        pytest.raises(InputError, match="another run is writing this collection"),
+        pytest.raises(InputError, match="another run writes here"),
     ):
         generate_collection(sweep_of(recipe_file), tmp_path)
 
