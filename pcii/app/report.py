@@ -23,17 +23,21 @@ COARSE_PX = 320
 def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
     dataset, pictures = outcome.dataset, Pictures.of(outcome)
-    grid = dataset.grid
+    grid, (rows, cols) = dataset.grid, pictures.box
+    slider, first = slider_panels(pictures)
     content = {
         "title": dataset.manifest.get("title") or dataset.name,
         "grid": grid,
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
         "has_truth": dataset.truth is not None,
-        "is_coarse": max(grid.shape_HW) < COARSE_PX,
+        "rows": rows,
+        "cols": cols,
+        "is_coarse": max(rows.stop - rows.start, cols.stop - cols.start) < COARSE_PX,
         "smoothing_px": pictures.smoothing_px,
         "light": pictures.light,
-        "slider": slider_panels(pictures),
+        "slider": slider,
+        "first": first,
         "input": input_panels(pictures),
         "planes": plane_panels(pictures),
         "depth": depth_panels(pictures),

@@ -1,6 +1,7 @@
 """Pictures of a report: a view, sections through the depths, masks and truth of each plane, depth and error.
 
-All show the whole frame, in blocks of `step_px` x `step_px` pixels if it is large.
+All show the same part of the frame, in blocks of `step_px` x `step_px` pixels if it is large: around the true
+objects or, without any, around what the methods claim.
 """
 
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from pcii.figures.pictures import (
     mask_image,
     photo_uri,
 )
+from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.bayer import colours_and_samples
@@ -45,6 +47,7 @@ MIN_SLIDER_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 SECTIONS_AT_ONCE = 4
 """Sections of the slider in memory at once; each such group reads all views."""
+WHOLE = (slice(None), slice(None))
 UNSATURATED_SHARE = 0.95
 """Share of the errors of depth that lie within the scale of their colours."""
 
@@ -56,21 +59,29 @@ Estimate = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """The results that a report shows, the side of its blocks, and how photons of sections are smoothed.
+    """The results that a report shows, rows and columns of the frame, the side of its blocks, and smoothing.
 
     `smoothing_px` is the standard deviation in pixels of the Gaussian, 0 for none.
     """
 
     outcome: Outcome
+    box: tuple[slice, slice]
     step_px: int
     smoothing_px: float
 
     @classmethod
     def of(cls, outcome: Outcome) -> "Pictures":
-        """Blocks by the size of the frame, and a Gaussian by the number of photons."""
-        has_counts = outcome.dataset.has_counts
-        smoothing_px = smoothing_for(list(outcome.sections.counts)) if has_counts else 0.0
-        return cls(outcome, block_px(outcome.dataset.grid.shape_HW, LONGEST_PX), smoothing_px)
+        """The part around objects or claims, else all; a Gaussian by the number of photons."""
+        truth, smoothing_px = outcome.dataset.truth, 0.0
+        region = np.zeros(outcome.dataset.grid.shape_HW, dtype=bool)
+        if truth is not None and truth.has_objects:
+            region = truth.object_id > 0
+        elif outcome.focus:
+            region = np.any([focus.in_focus.any(axis=0) for focus in outcome.focus], axis=0)
+        box = box_around(region)
+        if outcome.dataset.has_counts:
+            smoothing_px = smoothing_for([counts[box] for counts in outcome.sections.counts])
+        return cls(outcome, box, block_px([side.stop - side.start for side in box], LONGEST_PX), smoothing_px)
 
     @property
     def light(self) -> str:
@@ -82,6 +93,7 @@ class Pictures:
 
     def middles(self, image: np.ndarray) -> np.ndarray:
         """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
+        image = image[self.box]
         rows, cols = (
             np.minimum(np.arange(0, size, self.step_px) + self.step_px // 2, size - 1)
             for size in image.shape[:2]
@@ -89,8 +101,10 @@ class Pictures:
         return image[rows][:, cols]
 
 
-def block_estimates(sections: Sections, step_px: int, smoothing_px: float = 0.0) -> list[Estimate]:
-    """Estimates of the blocks of each section: the sums of its counts over its samples.
+def block_estimates(
+    sections: Sections, step_px: int, smoothing_px: float = 0.0, box: tuple[slice, slice] = WHOLE
+) -> list[Estimate]:
+    """Estimates of the blocks of a part of each section: the sums of its counts over its samples.
 
     Both are smoothed by a Gaussian with a standard deviation of `smoothing_px` pixels of the frame. At some
     depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the estimate is
@@ -98,7 +112,7 @@ def block_estimates(sections: Sections, step_px: int, smoothing_px: float = 0.0)
     """
     estimates: list[Estimate] = []
     for counts, coverage in zip(sections.counts, sections.coverage, strict=True):
-        sums, samples = image_block_sums(counts, step_px), image_block_sums(coverage, step_px)
+        sums, samples = (image_block_sums(values[box], step_px) for values in (counts, coverage))
         if smoothing_px:
             sums, samples = smoothed(sums, samples, smoothing_px / step_px)
         estimates.append((filled_means(sums, samples), samples))
@@ -117,15 +131,24 @@ def slider_planes(outcome: Outcome) -> FocalPlanes:
     return planes.take(slice(None, None, -1))  # from near to far
 
 
-def slider_panels(pictures: Pictures) -> list[Panel]:
-    """Sections through the depth range, all at one exposure; captions are depths."""
+def slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
+    """Sections through the depth range, all at one exposure, and which is at the first plane of the analysis.
+
+    Captions are depths.
+    """
     planes, estimates = slider_planes(pictures.outcome), list[Estimate]()
     for first in range(0, len(planes), SECTIONS_AT_ONCE):
         group = planes.take(slice(first, first + SECTIONS_AT_ONCE))
         sections = reconstruct(pictures.outcome.dataset.counts_or_views, group)
-        estimates += block_estimates(sections, pictures.step_px, pictures.smoothing_px)
+        estimates += block_estimates(sections, pictures.step_px, pictures.smoothing_px, pictures.box)
     images = each_in_threads(photo_uri, encoded(estimates))
-    return [{"image": image, "caption": f"{z:.4g} mm"} for image, z in zip(images, planes.z_mm, strict=True)]
+    panels = [
+        {"image": image, "caption": f"{z:.4g} mm"} for image, z in zip(images, planes.z_mm, strict=True)
+    ]
+    first = np.abs(
+        planes.total_disparity_px - pictures.outcome.sections.planes.total_disparity_px[0]
+    ).argmin()
+    return panels, int(first)
 
 
 def input_panels(pictures: Pictures) -> list[Panel]:
@@ -135,9 +158,11 @@ def input_panels(pictures: Pictures) -> list[Panel]:
     panels: list[Panel] = []
     if dataset.has_counts:
         view = dataset.counts.view(k, l)
-        panels.append(_drawing(photon_picture(view, step_px), f"view ({k}, {l}): {view.sum()} photons"))
+        image = photon_picture(view[pictures.box], step_px)
+        panels.append(_drawing(image, f"view ({k}, {l}): {view.sum()} photons"))
     if dataset.views is not None:
-        light = colours_and_samples(dataset.views.view(k, l), dataset.views.cfa)
+        sums, samples = colours_and_samples(dataset.views.view(k, l), dataset.views.cfa)
+        light = sums[pictures.box], samples[pictures.box]
         panels.append(_photo(exposed([light], step_px)[0], f"view ({k}, {l}) at full light"))
     return panels
 
@@ -146,10 +171,12 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
     """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
     outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
     true = None if truth is None else TrueFocus(outcome.sections.planes, truth).by_object  # (Z, H, W)
-    images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px))
+    images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px, pictures.box))
     lights = {pictures.light: images}
     if outcome.dataset.has_counts and outcome.full_light is not None:
-        lights["full light (Eq. 2)"] = encoded(block_estimates(outcome.full_light, pictures.step_px))
+        lights["full light (Eq. 2)"] = encoded(
+            block_estimates(outcome.full_light, pictures.step_px, box=pictures.box)
+        )
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
         sections = [_photo(light[plane], f"section at {z:g} mm, {words}") for words, light in lights.items()]
