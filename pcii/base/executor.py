@@ -78,9 +78,13 @@ def _do_elsewhere(piece: int, pickled: bytes) -> Any:
 # Local worker processes
 
 
+WAKING_S = 0.25
+"""So often is looked whether Ctrl-C was pressed, which a longer wait would notice later."""
+
+
 def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generator[tuple[int, Any]]:
     import multiprocessing
-    from concurrent.futures import as_completed
+    from concurrent.futures import FIRST_COMPLETED, wait
     from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 
     pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
@@ -94,8 +98,10 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
             futures = {pool.submit(_do_elsewhere, piece, pickled): piece for piece in pieces}
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        while futures:
+            # A signal that another thread gets does not wake this one: it looks from time to time.
+            for future in wait(futures, WAKING_S, FIRST_COMPLETED).done:
+                yield futures.pop(future), future.result()
     except BrokenProcessPool:
         raise WorkerLostError(f"a worker process died, perhaps for want of memory; {GOES_ON}") from None
     finally:
