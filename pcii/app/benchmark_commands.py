@@ -53,7 +53,7 @@ def run(
     method
         A method of removal, or depth:NAME; or module:function or file.py:function, after depth: for depth.
     budget
-        Score at so many photons per view only, or at full-light; may be repeated. For a first look.
+        The only photons per view to score at, or full-light; may be repeated. For a first look.
     """
     with Stages() as report:
         opened = open_benchmark(data, half)

@@ -87,7 +87,7 @@ def import_dataset(
         Bayer pattern: GRBG, RGGB, BGGR or GBRG; none for a sensor without colours. Of RGB pictures each pixel
         keeps one colour; grey ones are mosaics already.
     photons
-        Draw photon counts with so many expected in each view.
+        Draw photon counts; the number of photons expected in each view.
     seed
         Seed of these counts; 1 by default.
     z_mm

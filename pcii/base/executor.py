@@ -3,15 +3,19 @@
 import logging
 import os
 import pickle
+import queue
 import signal
 import threading
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError, WorkerLostError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 GOES_ON = "what is finished stays, and the same command goes on from there"
 CONNECTION_TIMEOUT_S = 5.0
@@ -84,9 +88,9 @@ WAKING_S = 0.25
 
 def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generator[tuple[int, Any]]:
     import multiprocessing
-    from concurrent.futures import FIRST_COMPLETED, wait
     from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 
+    done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
     pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
     # Not forked: what other threads hold locked would be locked for ever in the copy.
     spawning = multiprocessing.get_context("spawn")
@@ -98,10 +102,17 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
             futures = {pool.submit(_do_elsewhere, piece, pickled): piece for piece in pieces}
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        while futures:
+        for future in futures:
+            future.add_done_callback(done.put)
+        left = len(futures)
+        while left:
             # A signal that another thread gets does not wake this one: it looks from time to time.
-            for future in wait(futures, WAKING_S, FIRST_COMPLETED).done:
-                yield futures.pop(future), future.result()
+            try:
+                future = done.get(timeout=WAKING_S)
+            except queue.Empty:
+                continue
+            left -= 1
+            yield futures[future], future.result()
     except BrokenProcessPool:
         raise WorkerLostError(f"a worker process died, perhaps for want of memory; {GOES_ON}") from None
     finally:

@@ -114,16 +114,16 @@ def _checked(estimate: Callable[..., object], label: str, name: str | None) -> M
     """The method of a function that may do anything: it raises `InputError`, which begins with `label`."""
 
     def method(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
-        found = called(estimate, label, data, z_range_mm)
+        depth = called(estimate, label, data, z_range_mm)
         shape_HW = data.grid.shape_HW
-        if not isinstance(found, DepthMap) or found.z_mm.shape != shape_HW:
+        if not isinstance(depth, DepthMap) or depth.z_mm.shape != shape_HW:
             raise InputError(f"{label} must return a pcii.DepthMap of {shape_HW[0]} x {shape_HW[1]} pixels")
-        z_mm, confidence = found.z_mm, found.confidence
+        z_mm, confidence = depth.z_mm, depth.confidence
         if not np.all(np.isnan(z_mm) | ((z_mm > 0) & (z_mm < np.inf))):
             raise InputError(f"{label} must return depths above 0 mm, or NaN where it has no answer")
         if not np.all((confidence >= 0) & (confidence <= 1)):
             raise InputError(f"{label} must return a confidence from 0 to 1, also where it has no answer")
-        return found
+        return depth
 
     return method
 

@@ -21,7 +21,7 @@ LEAST_LOG_RATIO, MOST_LOG_RATIO = -8.0, 8.0
 LEAST_PHOTONS, MOST_PHOTONS = 1e-2, 1e3
 """Ends of the mean number of photons in a cell."""
 HINT_WIDTHS_PX = (1.5, 6.0)
-"""Standard deviations, in total disparity, of how near a plane is to one that is asked for."""
+"""Standard deviations, in total disparity, of the nearness of a plane to a requested one."""
 
 
 class NetworkInputs(NamedTuple):

@@ -130,7 +130,7 @@ class PosteriorDepth:
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
-        hint = hint_of(planes.total_disparity_px, np.zeros(0))  # no plane is asked for
+        hint = hint_of(planes.total_disparity_px, np.zeros(0))  # no plane is requested
         return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:

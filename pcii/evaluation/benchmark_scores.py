@@ -104,14 +104,14 @@ def run_method(
     there, for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_method(method)
-    chosen = {budget_of(each) for each in budgets}
+    requested = {budget_of(each) for each in budgets}
     tasks: list[Task] = []
     for dataset in data.datasets:
         lights = [
             light
             for light in lights_of(dataset)
             if light is not None
-            and (not chosen or light in chosen)
+            and (not requested or light in requested)
             and named.takes(full_light=light == FULL_LIGHT)
         ]
         if lights:

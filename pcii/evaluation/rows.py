@@ -79,7 +79,7 @@ def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
-    """Identity of the dataset, light and method of a row, and depths where others were asked for."""
+    """Identity of the dataset, light and method of a row, and depths that replace the dataset's."""
     return row["identity"], row["budget"], row["method"], tuple(row.get("z_mm", ()))
 
 

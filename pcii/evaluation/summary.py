@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Kind = Literal["signed", "share", "positive", "geometric"]
 CONFIDENCE = 0.95
 MAX_EXACT_PAIRS = 14
-"""Up to so many pairs all assignments of signs are computed: 2^14 means take milliseconds."""
+"""Largest number of pairs of which all assignments of signs are computed: 2^14 means take milliseconds."""
 RANDOM_FLIPS = 10_000
 """Random assignments of signs for more pairs."""
 MIN_SCENES = 2

@@ -41,7 +41,7 @@ DEPTH = {
 }
 """The same of depth."""
 MAX_DETAILED_SCENES = 12
-"""Up to so many scenes have tables of all measures; those of more make a page that nobody can load."""
+"""Largest number of scenes with tables of all measures: those of more make a page that nobody can load."""
 
 
 @dataclass(frozen=True)
