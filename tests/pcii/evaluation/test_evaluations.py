@@ -274,15 +274,16 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
     series: Path, tmp_path: Path, calls: list[str]
 ) -> None:
     out = tmp_path / "out"
-    (tmp_path / "empty").mkdir()
+    (tmp_path / "more" / "seed_9").mkdir(parents=True)
     for sentence, datasets in (
         ("no such dataset folder", [tmp_path / "nowhere"]),
-        ("neither a finished dataset nor", [tmp_path / "empty"]),
+        ("neither a finished dataset nor", [tmp_path / "more" / "seed_9"]),
+        ("seed_9: not a finished dataset", [tmp_path / "more"]),
         ("at least one", []),
     ):
         with pytest.raises(InputError, match=sentence):
             evaluate(datasets, out, methods=FAKES)
-    with pytest.raises(InputError, match="no photons of budget 7"):
+    with pytest.raises(InputError, match="has no budget 7; there are 20, 50"):
         evaluate([series], out, methods=FAKES, budgets=[7])
     with pytest.raises(InputError, match="holds something else"):
         evaluate([series], series, methods=FAKES)

@@ -20,7 +20,7 @@ from pcii.evaluation import tables
 from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import frame_of, origin_of
 from pcii.removal.methods import METHODS
-from pcii.store.dataset import FULL_LIGHT, open_dataset
+from pcii.store.dataset import open_dataset
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import Segmented
 
@@ -165,7 +165,7 @@ def test_a_page_of_200_scenes_is_small_and_in_their_order(tmp_path: Path) -> Non
         | {"depth": {"bad_1px": (scene + seed + number) / 210}}
         for scene in range(200)[::-1]
         for seed in (1, 2)
-        for light in (30.0, 100.0, 300.0, 1000.0, FULL_LIGHT)
+        for light in (30.0, 100.0, 300.0, 1000.0, "full-light")
         for number, letter in enumerate("abcde")
     ]
     (tmp_path / "rows.jsonl").touch()

@@ -35,9 +35,9 @@ def submitted(data: BenchmarkHalf, tmp_path_factory: pytest.TempPathFactory) -> 
     (folder / SUBMISSION).write_text(json.dumps({"benchmark": "small", "method": "mine", "authors": "A. N."}))
     for dataset in data.datasets:
         z_range_mm = tuple(dataset.analysis["z_range_mm"])
-        for light in dataset.budgets if dataset.has_counts else ("full-light",):
-            chosen = dataset.at_budget(light)
-            inside = folder / dataset.name / (light if isinstance(light, str) else f"{light:g}")
+        for light in dataset.lights:
+            chosen = dataset.at_light(light)
+            inside = folder / dataset.name / str(light)
             inside.mkdir(parents=True)
             depth = pcii.estimate_depth(chosen.counts_or_views, z_range_mm, method="variance-sweep")
             np.savez(inside / "depth.npz", z_mm=depth.z_mm, confidence=depth.confidence)

@@ -49,7 +49,7 @@ def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
     assert dataset.grid == GRID
     assert dataset.cfa == "GRBG"
     assert dataset.counts.total == pytest.approx(9 * 300, abs=4 * np.sqrt(2700))
-    assert dataset.budgets == (300,)
+    assert dataset.light.photons == 300
     assert dataset.views is not None
     assert dataset.views.cfa == "GRBG"
     disparities = [467 / z for z in dataset.analysis["z_mm"]]  # in px, from the first camera to the last

@@ -73,7 +73,7 @@ def test_a_file_of_another_name_and_options_of_light_and_film(tmp_path: Path, ca
     assert "pictures with a transforms.json of train.json" in said
     assert "are not in train.json" not in said
     assert (dataset.grid.focal_mm, dataset.grid.pixel_mm) == (35, 35 / 40)
-    assert (dataset.cfa, dataset.budgets) == ("GRBG", (50,))
+    assert (dataset.cfa, dataset.light.photons) == ("GRBG", 50)
     assert dataset.views is not None
     first, second = numbers(1, 2)[0, :2] / 255  # a row of GRBG begins with green and red
     np.testing.assert_allclose(dataset.views.view(1, 2)[0, :2, 0], [first[1], second[0]], rtol=1e-5)
