@@ -258,7 +258,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "too far apart for a grid"),
     ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
     ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
-    ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
+    ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "bool is no type of light.*--counts"),
     ("turned JPEG", folder(turned("JPEG")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
     ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "exceeds limit of"),
     ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),

@@ -92,7 +92,7 @@ def test_members_at_the_top_that_are_wrong_are_named(tmp_path: Path, top, told) 
 @pytest.mark.parametrize(
     ("frame", "told"),
     [
-        ({"transform_matrix": MATRIX[:3]}, "transform_matrix: expected four rows of four numbers"),
+        ({"transform_matrix": MATRIX[:2]}, "transform_matrix: expected four rows of four numbers"),
         ({"transform_matrix": changed(0, 1, 0.3)}, "transform_matrix: is no rotation"),
         ({"transform_matrix": scaled(2.5)}, "transform_matrix: is no rotation; .* scale by 2.5 to 2.5"),
         ({"file_path": "images/../../x.png"}, "file_path: expected a path inside the folder"),
