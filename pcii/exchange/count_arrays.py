@@ -190,7 +190,7 @@ def _warn_of_packed_bytes(name: str, numbers: np.ndarray, tell: Tell) -> None:
 def _warn_of_multiples(name: str, numbers: np.ndarray, tell: Tell) -> None:
     """Warn of counts that are all multiples of a number, such as of binary pictures of 0 and 255."""
     step = int(np.gcd.reduce(numbers, axis=None))
-    if step > 1 and np.count_nonzero(numbers) >= MIN_JUDGED_BYTES:
+    if step > 1 and np.count_nonzero(numbers) * np.log(step) > 20:  # by chance it is one in e^20
         tell(f"warning: all numbers of {name} are multiples of {step}; if that is one photon, divide by it")
 
 

@@ -1,0 +1,146 @@
+"""What real files of the field are like: the case that mattered most of each kind of source."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from picture_folders import OPTICS, H, W, numbers, write
+from PIL import Image
+from png_files import chunk, compressed, png_file
+from posed_frames import frames_of, read
+from test_arrays_and_lenses import hci_folder, pfm
+
+from pcii import InputError, import_arrays, import_counts, import_hci, import_images
+from pcii.exchange.transforms_file import read_transforms
+
+GREY = np.random.default_rng(1).integers(0, 65536, (H, W)).astype(np.uint16)
+BITS = np.random.default_rng(2).random((2, 2, 5, H, W)) < 0.3
+COUNTS = np.random.default_rng(3).poisson(2.0, (2, 2, 5, H, W))
+
+
+def gamma(value: float) -> bytes:
+    pixels = compressed((GREY >> 8).astype(np.uint8))
+    return png_file(W, H, 8, 0, pixels, chunk(b"gAMA", struct.pack(">I", round(1e5 * value))))
+
+
+@pytest.mark.parametrize(("value", "unused"), [(0.45455, []), (1.0, ["not used: the gamma of 1 in 0_0.png"])])
+def test_a_gamma_that_is_not_used_is_named(tmp_path: Path, value: float, unused: list[str]) -> None:
+    (tmp_path / "0_0.png").write_bytes(gamma(value))
+    (tmp_path / "._0_0.png").write_bytes(b"\0\5\x16\7")  # what macOS leaves beside files
+    told: list[str] = []
+    views = import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", tell=told.append)
+    np.testing.assert_allclose(views.view(0, 0)[..., 0], (GREY >> 8) / 255, rtol=1e-6)
+    assert told == unused
+
+
+def write_ome_set(folder: Path) -> None:
+    """Files of which each holds the frames of one view, and names all the others as parts of one image."""
+    names = {(k, l): f"{k}_{l}.tif" for k, l in np.ndindex(2, 2)}
+    data = "".join(
+        f'<TiffData FirstZ="{z}" FirstT="0" FirstC="0" IFD="0" PlaneCount="5"><UUID FileName="{name}">'
+        f"urn:uuid:{z:032d}</UUID></TiffData>"
+        for z, name in enumerate(names.values())
+    )
+    for z, (camera, name) in enumerate(names.items()):
+        ome = (
+            '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" '
+            f'UUID="urn:uuid:{z:032d}"><Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="XYTZC" '
+            f'Type="uint16" SizeX="{W}" SizeY="{H}" SizeT="5" SizeZ="4" SizeC="1">'
+            f'<Channel ID="Channel:0:0" SamplesPerPixel="1"/>{data}</Pixels></Image></OME>'
+        )
+        tifffile.imwrite(folder / name, COUNTS[camera].astype(np.uint16), description=ome, metadata=None)
+
+
+@pytest.mark.parametrize("kind", ["OME set", "uint32", "int16", ">u2", "one frame", "Fortran order"])
+def test_counts_of_views_as_other_programs_save_them(tmp_path: Path, kind: str) -> None:
+    seen, ending = COUNTS, "npy" if kind in ("one frame", "Fortran order") else "tif"
+    if kind == "OME set":
+        write_ome_set(tmp_path)
+    for k, l in np.ndindex(2, 2) if kind != "OME set" else ():
+        path = tmp_path / f"{k}_{l}.{ending}"
+        if ending == "tif":
+            order = ">" if kind == ">u2" else "<"
+            tifffile.imwrite(path, COUNTS[k, l].astype(kind), photometric="minisblack", byteorder=order)
+        elif kind == "one frame":
+            seen = COUNTS[:, :, :1]
+            np.save(path, COUNTS[k, l, 0])
+        else:
+            np.save(path, np.asfortranarray(COUNTS[k, l]))
+    counts = import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}")
+    np.testing.assert_array_equal(counts.dense, seen.sum(axis=2))
+    assert counts.readout.frames == seen.shape[2]
+
+
+def test_frames_of_0_and_255_are_warned_of() -> None:
+    told: list[str] = []
+    import_counts((255 * BITS).astype(np.uint8), OPTICS, tell=told.append)
+    assert told == ["warning: all numbers of array are multiples of 255; if that is one photon, divide by it"]
+    import_counts(BITS.astype(np.uint8), OPTICS, tell=told.append)
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("light", "words"),
+    [(np.array(3.0), r"expected \(K, L, H, W"), (COUNTS, "--counts for photons; got int64")],
+)
+def test_arrays_of_other_things_are_refused(tmp_path: Path, light: np.ndarray, words: str) -> None:
+    np.save(tmp_path / "in.npy", light)
+    with pytest.raises(InputError, match=words):
+        import_arrays(tmp_path / "in.npy", OPTICS)
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "calibrated"])
+def test_counts_that_a_file_does_not_keep_are_refused(tmp_path: Path, kind: str) -> None:
+    if kind == "JPEG":
+        Image.fromarray(numbers(0, 0)[..., 0]).save(tmp_path / "0_0.in", "JPEG")
+    else:  # signed numbers, as ImageJ has them
+        stored = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
+        tifffile.imwrite(tmp_path / "0_0.in", (COUNTS[0, 0] + 32768).astype(np.uint16), **stored)
+    words = {"JPEG": "not a PNG, TIFF or EXR picture", "calibrated": r"a calibration of ImageJ \(c0, c1\)"}
+    with pytest.raises(InputError, match=words[kind]):
+        import_counts(tmp_path, OPTICS, pattern="{row}_{col}.in")
+
+
+def test_a_transforms_file_of_nulls_strings_and_three_rows(tmp_path: Path) -> None:
+    """An angle of view of a frame wins over the focal length at the top; PowerShell writes UTF-16."""
+    frames = frames_of(2, 2)
+    for frame in frames:
+        frame |= {"camera_angle_x": 2 * np.arctan(320 / 500), "cx": "320", "k1": None}
+        del frame["transform_matrix"][3]
+    file = read(tmp_path, frames)
+    assert file.focal_px == pytest.approx(500)
+    document = json.loads(file.path.read_text()) | {"k2": None, "w": "640"}
+    file.path.write_bytes(json.dumps(document).encode("utf-16"))
+    again = read_transforms(file.path)
+    np.testing.assert_array_equal(again.poses, file.poses)
+    assert again.width == 640
+
+
+def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
+    """Ends of lines, remarks, names in capitals, an author in Latin-1, and a map with a scale."""
+    root = hci_folder(tmp_path / "scene")
+    text = (root / "parameters.cfg").read_text().replace("= 100.0", "= 100.0 ; mm") + "authors = Jürgen\n"
+    (root / "parameters.cfg").write_bytes(text.replace("\n", "\r\n").encode("latin-1"))
+    for path in root.glob("*.png"):
+        path.rename(path.with_suffix(".PNG"))
+    pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
+    told: list[str] = []
+    scene = import_hci(root, tell=told.append)
+    assert (scene.views.grid.focal_mm, told[1:]) == (100.0, ["not used of parameters.cfg: authors"])
+    assert scene.truth is not None
+    np.testing.assert_allclose(scene.truth.z_mm, 4000)
+
+
+def test_chromaticities_that_are_not_used_are_named(tmp_path: Path) -> None:
+    import OpenEXR
+
+    wide = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)
+    header = {"type": OpenEXR.scanlineimage, "chromaticities": wide}
+    with OpenEXR.File(header, {"RGB": np.ones((H, W, 3), np.float32)}) as file:
+        file.write(str(tmp_path / "0_0.exr"))
+    write(tmp_path / "0_1.exr", np.ones((H, W, 3), np.float32))
+    with pytest.warns(UserWarning, match=r"^not used: the chromaticities in 0_0\.exr$"):
+        import_images(tmp_path, "{row}_{col}.exr", OPTICS)
