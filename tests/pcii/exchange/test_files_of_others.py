@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, numbers, write
+from picture_folders import OPTICS, H, W, numbers
 from PIL import Image
 from png_files import chunk, compressed, png_file
 from posed_frames import frames_of, read
@@ -54,24 +54,60 @@ def write_ome_set(folder: Path) -> None:
         tifffile.imwrite(folder / name, COUNTS[camera].astype(np.uint16), description=ome, metadata=None)
 
 
-@pytest.mark.parametrize("kind", ["OME set", "uint32", "int16", ">u2", "one frame", "Fortran order"])
-def test_counts_of_views_as_other_programs_save_them(tmp_path: Path, kind: str) -> None:
-    seen, ending = COUNTS, "npy" if kind in ("one frame", "Fortran order") else "tif"
+def write_counts(folder: Path, kind: str) -> str:
+    """Files of the frames of each view; returns the pattern of their names."""
     if kind == "OME set":
-        write_ome_set(tmp_path)
-    for k, l in np.ndindex(2, 2) if kind != "OME set" else ():
-        path = tmp_path / f"{k}_{l}.{ending}"
-        if ending == "tif":
-            order = ">" if kind == ">u2" else "<"
-            tifffile.imwrite(path, COUNTS[k, l].astype(kind), photometric="minisblack", byteorder=order)
-        elif kind == "one frame":
-            seen = COUNTS[:, :, :1]
-            np.save(path, COUNTS[k, l, 0])
-        else:
-            np.save(path, np.asfortranarray(COUNTS[k, l]))
-    counts = import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}")
-    np.testing.assert_array_equal(counts.dense, seen.sum(axis=2))
-    assert counts.readout.frames == seen.shape[2]
+        write_ome_set(folder)
+        return "{row}_{col}.tif"
+    # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
+    options = {"ImageJ": {"imagej": True, "truncate": True}, "shaped": {"truncate": True}}
+    options |= {"appended": {"append": True}, ">u2": {"byteorder": ">"}}
+    for k, l in np.ndindex(2, 2):
+        path, frames = folder / f"{k}_{l}.tif", COUNTS[k, l].astype("int16" if kind == "int16" else "uint16")
+        for part in np.split(frames, 5) if kind == "appended" else [frames]:
+            tifffile.imwrite(path, part, photometric="minisblack", **options.get(kind, {}))
+    return "{row}_{col}.tif"
+
+
+@pytest.mark.parametrize("kind", ["plain", "ImageJ", "shaped", "appended", ">u2", "int16", "OME set"])
+def test_frames_of_tiff_files_are_added_up(tmp_path: Path, kind: str) -> None:
+    counts = import_counts(tmp_path, OPTICS, pattern=write_counts(tmp_path, kind))
+    np.testing.assert_array_equal(counts.dense, COUNTS.sum(axis=2))
+    assert counts.readout.frames == 5
+
+
+@pytest.mark.parametrize("array", [COUNTS, COUNTS.astype(">f8"), np.asfortranarray(COUNTS), BITS], ids=str)
+def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> None:
+    np.save(tmp_path / "all.npy", array)
+    for source in (array, tmp_path / "all.npy"):
+        counts = import_counts(source, OPTICS, cfa="GRBG")
+        np.testing.assert_array_equal(counts.dense, array.sum(axis=2))
+        assert (counts.cfa, counts.readout.frames) == ("GRBG", 5)
+        assert (counts.frame is not None) == (array is BITS)  # of one bit the frame of each count is kept
+    np.save(tmp_path / "0_0.npy", array[0, 0, 0])  # one frame without an axis of frames
+    single = import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", tell=[].append)
+    np.testing.assert_array_equal(single.view(0, 0), array[0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("array", "words"),
+    [(COUNTS, "uint16, or --counts for photons; got int64"), (np.array(3.0), r"\(K, L, H, W")],
+)
+def test_arrays_that_are_no_light_are_refused(array: np.ndarray, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        import_arrays(array, OPTICS)
+
+
+@pytest.mark.parametrize(
+    ("ending", "words"),
+    [("jpg", "not a PNG, TIFF or EXR picture"), ("tif", r"a calibration of ImageJ \(c0, c1\)")],
+)
+def test_pictures_that_do_not_keep_counts_are_refused(tmp_path: Path, ending: str, words: str) -> None:
+    Image.fromarray(numbers(0, 0)[..., 0]).save(tmp_path / "0_0.jpg")
+    signed = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
+    tifffile.imwrite(tmp_path / "0_0.tif", (COUNTS[0, 0] + 32768).astype(np.uint16), **signed)
+    with pytest.raises(InputError, match=words):
+        import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", tell=[].append)
 
 
 def test_frames_of_0_and_255_are_warned_of() -> None:
@@ -80,28 +116,6 @@ def test_frames_of_0_and_255_are_warned_of() -> None:
     assert told == ["warning: all numbers of array are multiples of 255; if that is one photon, divide by it"]
     import_counts(BITS.astype(np.uint8), OPTICS, tell=told.append)
     assert len(told) == 1
-
-
-@pytest.mark.parametrize(
-    ("light", "words"),
-    [(np.array(3.0), r"expected \(K, L, H, W"), (COUNTS, "--counts for photons; got int64")],
-)
-def test_arrays_of_other_things_are_refused(tmp_path: Path, light: np.ndarray, words: str) -> None:
-    np.save(tmp_path / "in.npy", light)
-    with pytest.raises(InputError, match=words):
-        import_arrays(tmp_path / "in.npy", OPTICS)
-
-
-@pytest.mark.parametrize("kind", ["JPEG", "calibrated"])
-def test_counts_that_a_file_does_not_keep_are_refused(tmp_path: Path, kind: str) -> None:
-    if kind == "JPEG":
-        Image.fromarray(numbers(0, 0)[..., 0]).save(tmp_path / "0_0.in", "JPEG")
-    else:  # signed numbers, as ImageJ has them
-        stored = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
-        tifffile.imwrite(tmp_path / "0_0.in", (COUNTS[0, 0] + 32768).astype(np.uint16), **stored)
-    words = {"JPEG": "not a PNG, TIFF or EXR picture", "calibrated": r"a calibration of ImageJ \(c0, c1\)"}
-    with pytest.raises(InputError, match=words[kind]):
-        import_counts(tmp_path, OPTICS, pattern="{row}_{col}.in")
 
 
 def test_a_transforms_file_of_nulls_strings_and_three_rows(tmp_path: Path) -> None:
@@ -132,15 +146,3 @@ def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
     assert (scene.views.grid.focal_mm, told[1:]) == (100.0, ["not used of parameters.cfg: authors"])
     assert scene.truth is not None
     np.testing.assert_allclose(scene.truth.z_mm, 4000)
-
-
-def test_chromaticities_that_are_not_used_are_named(tmp_path: Path) -> None:
-    import OpenEXR
-
-    wide = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)
-    header = {"type": OpenEXR.scanlineimage, "chromaticities": wide}
-    with OpenEXR.File(header, {"RGB": np.ones((H, W, 3), np.float32)}) as file:
-        file.write(str(tmp_path / "0_0.exr"))
-    write(tmp_path / "0_1.exr", np.ones((H, W, 3), np.float32))
-    with pytest.warns(UserWarning, match=r"^not used: the chromaticities in 0_0\.exr$"):
-        import_images(tmp_path, "{row}_{col}.exr", OPTICS)
