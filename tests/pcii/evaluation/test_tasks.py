@@ -104,9 +104,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
     ("has", "methods", "budgets", "sentence"),
     [
         ("counts", ["depth:structure-tensor"], [], "'depth:structure-tensor' needs radiance, and of .*; use"),
-        ("both", ["depth:structure-tensor"], [OWN], "no photons of budget 50"),
         ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
-        ("views", ["depth:focus"], [], "use depth:posterior, depth:variance-sweep, depth:structure-tensor$"),
         ("counts", [], [FULL_LIGHT], "has no radiance, and budget 'full-light' is of that"),
     ],
 )

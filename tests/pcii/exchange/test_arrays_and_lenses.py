@@ -85,16 +85,6 @@ def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
     assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
 
 
-def test_files_and_parameters_that_are_not_used_are_named(tmp_path: Path) -> None:
-    root = hci_folder(tmp_path / "scene")
-    text = (root / "parameters.cfg").read_text().replace("[meta]", "offset = 2\n[meta]\nscene = cotton")
-    (root / "parameters.cfg").write_text("\ufeff" + text)  # with a byte order mark
-    (root / "valid.png").write_bytes(b"")
-    told: list[str] = []
-    assert import_hci(root, tell=told.append).views.grid.rows == 3
-    assert told == ["not used: valid.png", "not used of parameters.cfg: offset, scene"]
-
-
 def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Path) -> None:
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))

@@ -1,6 +1,5 @@
 """What real files of the field are like: the case that mattered most of each kind of source."""
 
-import json
 import struct
 from pathlib import Path
 
@@ -10,11 +9,9 @@ import tifffile
 from picture_folders import OPTICS, H, W, numbers
 from PIL import Image
 from png_files import chunk, compressed, png_file
-from posed_frames import frames_of, read
 from test_arrays_and_lenses import hci_folder, pfm
 
 from pcii import InputError, import_arrays, import_counts, import_hci, import_images
-from pcii.exchange.transforms_file import read_transforms
 
 GREY = np.random.default_rng(1).integers(0, 65536, (H, W)).astype(np.uint16)
 BITS = np.random.default_rng(2).random((2, 2, 5, H, W)) < 0.3
@@ -76,7 +73,9 @@ def test_frames_of_tiff_files_are_added_up(tmp_path: Path, kind: str) -> None:
     assert counts.readout.frames == 5
 
 
-@pytest.mark.parametrize("array", [COUNTS, COUNTS.astype(">f8"), np.asfortranarray(COUNTS), BITS], ids=str)
+@pytest.mark.parametrize(
+    "array", [COUNTS, COUNTS.astype(">f8"), np.asfortranarray(COUNTS), BITS], ids=range(4)
+)
 def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> None:
     np.save(tmp_path / "all.npy", array)
     for source in (array, tmp_path / "all.npy"):
@@ -91,7 +90,7 @@ def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> Non
 
 @pytest.mark.parametrize(
     ("array", "words"),
-    [(COUNTS, "uint16, or --counts for photons; got int64"), (np.array(3.0), r"\(K, L, H, W")],
+    [(COUNTS, "--counts for photons; got int64"), (np.array(3.0), r"\(K, L, H, W")],
 )
 def test_arrays_that_are_no_light_are_refused(array: np.ndarray, words: str) -> None:
     with pytest.raises(InputError, match=words):
@@ -118,31 +117,18 @@ def test_frames_of_0_and_255_are_warned_of() -> None:
     assert len(told) == 1
 
 
-def test_a_transforms_file_of_nulls_strings_and_three_rows(tmp_path: Path) -> None:
-    """An angle of view of a frame wins over the focal length at the top; PowerShell writes UTF-16."""
-    frames = frames_of(2, 2)
-    for frame in frames:
-        frame |= {"camera_angle_x": 2 * np.arctan(320 / 500), "cx": "320", "k1": None}
-        del frame["transform_matrix"][3]
-    file = read(tmp_path, frames)
-    assert file.focal_px == pytest.approx(500)
-    document = json.loads(file.path.read_text()) | {"k2": None, "w": "640"}
-    file.path.write_bytes(json.dumps(document).encode("utf-16"))
-    again = read_transforms(file.path)
-    np.testing.assert_array_equal(again.poses, file.poses)
-    assert again.width == 640
-
-
 def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
-    """Ends of lines, remarks, names in capitals, an author in Latin-1, and a map with a scale."""
+    """Ends of lines, remarks, names in capitals, an author in Latin-1, a map with a scale, another file."""
     root = hci_folder(tmp_path / "scene")
     text = (root / "parameters.cfg").read_text().replace("= 100.0", "= 100.0 ; mm") + "authors = Jürgen\n"
     (root / "parameters.cfg").write_bytes(text.replace("\n", "\r\n").encode("latin-1"))
     for path in root.glob("*.png"):
         path.rename(path.with_suffix(".PNG"))
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
+    (root / "valid.png").write_bytes(b"")
     told: list[str] = []
     scene = import_hci(root, tell=told.append)
-    assert (scene.views.grid.focal_mm, told[1:]) == (100.0, ["not used of parameters.cfg: authors"])
+    assert scene.views.grid.focal_mm == 100
+    assert told[1:] == ["not used: valid.png", "not used of parameters.cfg: authors"]
     assert scene.truth is not None
     np.testing.assert_allclose(scene.truth.z_mm, 4000)

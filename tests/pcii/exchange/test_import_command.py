@@ -164,15 +164,6 @@ def turned(root: Path) -> None:
     Image.new("RGB", (W, H)).save(root / "0_0.png", "JPEG", exif=exif)
 
 
-def hci(old: str = "", new: str = "") -> Make:
-    def make(root: Path) -> Path:
-        path = hci_folder(root / "in") / "parameters.cfg"
-        path.write_text(path.read_text().replace(old, new))
-        return path.parent
-
-    return make
-
-
 def array(values: Any, name: str = "in.npy") -> Make:
     def make(root: Path) -> Path:
         np.save(root / name, values, allow_pickle=True)
@@ -207,9 +198,8 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("channels as pages", folder(channels, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
     ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
-    ("more cameras than views", hci("num_cams_x = 3", "num_cams_x = 4"), [], "3 of 3 x 4 views missing, first index 9"),
     ("options of other sources", folder(), [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames: not for .*, which is read as pictures"),
-    ("grid of known cameras", hci(), ["--grid", 3, 3], "--grid: not for .*, which is read as a scene of the HCI"),
+    ("grid of known cameras", lambda root: hci_folder(root / "in"), ["--grid", 3, 3], "--grid: not for .*, which is read as a scene of the HCI"),
 ]  # fmt: skip
 
 

@@ -46,18 +46,20 @@ def test_any_statement_of_the_focal_length_will_do(tmp_path: Path, name, value, 
 
 
 def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
-    """A byte order mark, no size, no endings, backslashes, places that were scaled, members of others."""
+    """UTF-16, no size, no endings, backslashes, scaled places, nulls, strings, three rows, other members."""
     frames = frames_of(1, 2)
     (tmp_path / "images").mkdir()
     for frame in frames:
         write(tmp_path / frame["file_path"], numbers(0, 0))
         frame |= {"file_path": frame["file_path"].replace("/", "\\").removesuffix(".png"), "sharpness": 30}
+        frame |= {"camera_angle_x": 2 * math.atan(W / 2 / 50), "cx": "4.0", "k1": None}  # wins over fl_x
+        del frame["transform_matrix"][3]
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
-    path.write_text("\ufeff" + path.read_text())
+    path.write_text(path.read_text(), "utf-16")
     told: list[str] = []
     file = read_transforms(path, tell=told.append)
     assert told == ["not used of transforms.json: aabb_scale, sharpness"]
-    assert (file.height, file.width) == (H, W)
+    assert (file.height, file.width, file.focal_px) == (H, W, pytest.approx(50))
     assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]
     assert find_grid(file).pitch_mm == (10, 10)
 
