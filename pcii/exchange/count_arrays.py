@@ -93,8 +93,8 @@ def import_counts(
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
     An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file of N
-    frames (N, H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
+    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file
+    (N, H, W) or (H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
     `import_images`. An array, or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W);
     with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W). With `bitpack` arrays have frames of bits, eight
     pixels in a byte, whose rows are `width` pixels wide, by default all bits. `frames` are the first and the

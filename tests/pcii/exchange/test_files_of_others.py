@@ -2,6 +2,7 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,7 +58,10 @@ def write_counts(folder: Path, kind: str) -> str:
         write_ome_set(folder)
         return "{row}_{col}.tif"
     # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
-    options = {"ImageJ": {"imagej": True, "truncate": True}, "shaped": {"truncate": True}}
+    options: dict[str, dict[str, Any]] = {
+        "ImageJ": {"imagej": True, "truncate": True},
+        "shaped": {"truncate": True},
+    }
     options |= {"appended": {"append": True}, ">u2": {"byteorder": ">"}}
     for k, l in np.ndindex(2, 2):
         path, frames = folder / f"{k}_{l}.tif", COUNTS[k, l].astype("int16" if kind == "int16" else "uint16")
@@ -103,7 +107,7 @@ def test_arrays_that_are_no_light_are_refused(array: np.ndarray, words: str) -> 
 )
 def test_pictures_that_do_not_keep_counts_are_refused(tmp_path: Path, ending: str, words: str) -> None:
     Image.fromarray(numbers(0, 0)[..., 0]).save(tmp_path / "0_0.jpg")
-    signed = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
+    signed: dict[str, Any] = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
     tifffile.imwrite(tmp_path / "0_0.tif", (COUNTS[0, 0] + 32768).astype(np.uint16), **signed)
     with pytest.raises(InputError, match=words):
         import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", tell=[].append)

@@ -66,12 +66,6 @@ def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes,
         assert counts.frame is None
 
 
-def test_exported_cubes_come_in_by_their_names(tmp_path: Path) -> None:
-    cubes = write_cubes(tmp_path, BITS, GRID)
-    counts = import_counts(cubes, OPTICS, pattern="{row}_{col}/frames.npy", bitpack=True, width=13)
-    check_counts(counts, BITS)
-
-
 @pytest.mark.parametrize(("grid", "cfa"), [(GRID, "GRBG"), (EIGHTS, None)])
 def test_exported_cubes_come_in_by_their_poses(tmp_path: Path, grid: CameraGrid, cfa: str | None) -> None:
     cubes = write_cubes(tmp_path, bits_of(grid), grid, cfa)
@@ -92,7 +86,7 @@ def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
     np.testing.assert_array_equal(dataset.counts.view(0, 0), BITS[1, 2, 2:].sum(axis=0))
 
 
-@pytest.mark.parametrize("kept", ["files", "one file", "counted file", "bool"])
+@pytest.mark.parametrize("kept", ["files", "one file", "counted file"])
 def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     pattern, source = None, tmp_path / "all.npy"
     options: dict[str, Any] = {"bitpack": True, "width": 13, "tell": [].append}
@@ -100,12 +94,9 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
         pattern, source = "{row}_{col}.npy", files_of(tmp_path / "views", BITS)
     elif kept == "one file":
         np.save(source, packed(BITS))
-    elif kept == "counted file":
+    else:
         np.save(source, packed(BITS).reshape(6, *packed(BITS).shape[2:]))
         options["grid"] = (2, 3)
-    else:
-        np.save(source, BITS)
-        options = {}
     order = ViewOrder(flip_rows=True)
     counts = import_counts(source, OPTICS, pattern=pattern, frames=(1, 7), order=order, **options)
     assert counts.readout.frames == 7
