@@ -131,12 +131,8 @@ def test_a_page_has_nothing_but_its_own_elements(pages: dict[str, str], which: s
     sent = [attributes for tag, attributes in read.elements if tag == "meta" and "http-equiv" in attributes]
     assert sent == [{"http-equiv": "Content-Security-Policy", "content": POLICIES[which]}]
     assert pages[which].index("Content-Security-Policy") < pages[which].index("<title>")
-
-
-def test_the_script_of_the_report_is_ours_alone(pages: dict[str, str]) -> None:
-    scripts = re.findall(r"<script[^>]*>(.*?)</script>", pages["report.html"], re.DOTALL | re.IGNORECASE)
-    assert scripts == [SCRIPT.decode()]
-    assert "<script" not in pages["evaluation.html"].lower()
+    scripts = re.findall(r"<script[^>]*>(.*?)</script>", pages[which], re.DOTALL | re.IGNORECASE)
+    assert scripts == [SCRIPT.decode()] * (which == "report.html")
 
 
 def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Outcome) -> None:

@@ -106,9 +106,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
     ("has", "methods", "budgets", "sentence"),
     [
         ("counts", ["depth:structure-tensor"], [], "'depth:structure-tensor' needs radiance, and of .*; use"),
-        ("both", ["depth:structure-tensor"], [OWN], "has no budget 50; there are exposure, full-light"),
         ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
-        ("views", ["depth:focus"], [], "use depth:posterior, depth:variance-sweep, depth:structure-tensor$"),
         ("counts", [], [FULL_LIGHT], "has no budget full-light; there are exposure"),
     ],
 )
@@ -122,14 +120,12 @@ def test_what_a_method_cannot_take_is_refused_before_any_work(
     assert not (tmp_path / "out").exists()
 
 
-def test_without_depths_of_planes_removal_is_left_out(tmp_path: Path) -> None:
+def test_depths_that_are_missing_or_too_near(tmp_path: Path) -> None:
+    """Without planes removal is left out, and refused by name; a range that cannot be searched is refused."""
     ranged = saved(tmp_path / "ranged", COUNTS, z_range_mm=(450, 800))
     assert chosen([ranged]) == [("ranged", None, name) for name in OF_COUNTS]
     with pytest.raises(InputError, match="suggests no depths"):
         chosen([ranged], "variance")
-
-
-def test_a_range_of_depths_that_cannot_be_searched_is_refused_before_any_work(tmp_path: Path) -> None:
     near = saved(tmp_path / "near", COUNTS, z_mm=[500], z_range_mm=(0.5, 800))
     with pytest.raises(InputError, match=r"near: z_range_mm: from .* choose a farther near end"):
         chosen([near], "depth")
