@@ -13,20 +13,6 @@ settings.register_profile("fast", max_examples=25, deadline=None)
 settings.register_profile("stress", max_examples=10_000, deadline=None)
 settings.load_profile("fast")  # unless --hypothesis-profile names another
 
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture(scope="session")
-def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """That of data_recipes/small.toml with fewer samples: 6 x 6 views of 256 x 256, GRBG, with radiance."""
-    from simgen.dataset.generation import generate
-    from simgen.spec.recipe import load_recipe
-
-    out = tmp_path_factory.mktemp("data") / "small"
-    recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"), ["render.samples_per_pixel=2"])
-    generate(recipe, near, out)
-    return out
-
 
 @pytest.fixture(scope="session")
 def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,15 +1,9 @@
-"""How many cases a test takes by default, and how many more `-m slow` or the profile of Hypothesis add."""
+"""Which cases a test takes by default, and which only `-m slow` does."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
 
 import pytest
-from hypothesis import settings
-
-
-def at_least(number: int) -> settings:
-    """Settings of so many cases, or of 10 000 with `--hypothesis-profile=stress`."""
-    return settings(max_examples=max(number, settings().max_examples), deadline=None)
 
 
 def mostly_slow(cases: Iterable[Any], quick: Collection[Any]) -> list[Any]:

@@ -62,7 +62,7 @@ NOT_SHARED = {
 }
 MOST_FILES, FEWEST_FILES = 14, 2
 LONGEST_FILE = 450
-# Files that are longer and rooms that are smaller than they should be: none may be added.
+# Files that are longer than they should be: none may be added.
 LONGER = {
     "pcii.removal.likelihood.layers",
 }
@@ -76,7 +76,6 @@ KNOW_RECIPE = {
     "simgen.dataset.resources",
     "simgen.spec.sweeps",
 }
-SMALL_ROOMS: set[str] = set()
 
 
 @cache
@@ -195,7 +194,7 @@ def test_rooms_are_neither_crowded_nor_empty_and_list_their_files(package: str) 
         folder = ROOT / package / room.replace(".", "/")
         files = {file.stem for file in folder.glob("*.py")} - {"__init__"}
         assert len(files) <= MOST_FILES, room
-        assert len(files) >= FEWEST_FILES or room in SMALL_ROOMS, room
+        assert len(files) >= FEWEST_FILES, room
         listed = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
         for name in files:
             assert f"\n{name} " in listed, f"{room}/__init__.py does not list {name}"

@@ -23,14 +23,6 @@ from pcii.store.dataset_layout import MARKER
 from simgen.app import commands as simgen_cli
 
 
-def generating(out: Path) -> list[str]:
-    """A command line for a process that heeds Ctrl-C, whoever started this one."""
-    script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    script += "from simgen.app.commands import main; sys.exit(main())"
-    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2"]
-    return [sys.executable, "-c", script, "generate", "small", "-o", str(out), *settings]
-
-
 def wait_for(path: Path) -> None:
     for _ in range(600):
         if path.exists():
@@ -45,13 +37,18 @@ ON = "stopped; the same command goes on from here"
 @pytest.mark.renders
 def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "small"
-    process = subprocess.Popen(generating(out), stderr=subprocess.PIPE, text=True)
+    # A process that heeds Ctrl-C, whoever started this one.
+    script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    script += "from simgen.app.commands import main; sys.exit(main())"
+    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2"]
+    command = ["generate", "small", "-o", str(out), *settings]
+    process = subprocess.Popen([sys.executable, "-c", script, *command], stderr=subprocess.PIPE, text=True)
     wait_for(out / "radiance" / "view_00_01.exr")
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors.splitlines()[-1]) == (130, ON)
     assert "Traceback" not in errors
-    assert subprocess.run(generating(out), capture_output=True, check=False).returncode == 0
+    assert command_line.run(simgen_cli.app, command) == 0
     assert command_line.run(simgen_cli.app, ["verify", str(out)]) == 0
 
 

@@ -121,12 +121,11 @@ def check_failure(code: int, error: str, out: Path) -> None:
     assert out.name in last, error  # or a temporary file beside it
 
 
-def check_after_all(folders: Folders, name: str, out: Path, before: Content) -> None:
+def check_after_all(work: Work, out: Path, before: Content, whole: Content) -> None:
     """Nothing is lost, and on a good disk the same command goes on to what it always gives."""
-    work = folders.works[name]
     assert not before or before.items() <= work.content(out).items()
     assert work.here(out) == 0
-    assert work.content(out) == folders.after(name)
+    assert work.content(out) == whole
     assert verify(out) > 0
 
 
@@ -141,6 +140,7 @@ def test_a_disk_that_breaks_is_named_and_loses_nothing(
     break_disk(counting := BrokenDisk(str(out.parent), sys.maxsize))  # results are written beside
     assert work.here(out) == 0
     break_disk(None)
+    whole = work.content(out)
     shutil.rmtree(out)
     chosen: Iterable[int] = range(counting.done)
     if at == "some changes":
@@ -154,7 +154,7 @@ def test_a_disk_that_breaks_is_named_and_loses_nothing(
         if code:  # else what failed was not needed
             check_failure(code, capsys.readouterr().err, out)
             failures += 1
-        check_after_all(folders, name, out, before)
+        check_after_all(work, out, before, whole)
         shutil.rmtree(out)
     assert failures > (0 if at == "some changes" else 15)
 
@@ -181,19 +181,18 @@ def mount(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dataset", "collection", "results", "evaluation"])
 def test_a_full_disk_is_named(folders: Folders, name: str, mount: Callable[[str], Path]) -> None:
-    failures = 0
-    folders.after(name)
+    work, whole, failures = folders.works[name], folders.after(name), 0
     free_kb = sum(file.stat().st_blocks for file in (folders.root / name).rglob("*")) // 2 + 4096
     for step in range(SIZES):
         out = mount(f"size={free_kb}k") / "out"
         before = folders.before(name, out)
         used_kb = sum(file.stat().st_blocks for file in out.rglob("*")) // 2
         mount(f"size={used_kb + 16 + step * (free_kb - 4096 - used_kb) // SIZES}k")
-        code, error = folders.works[name].apart(out)
+        code, error = work.apart(out)
         if code:
             check_failure(code, error, out)
             failures += 1
         mount(f"size={2 * free_kb}k")
-        check_after_all(folders, name, out, before)
+        check_after_all(work, out, before, whole)
         shutil.rmtree(out)
     assert failures >= SIZES // 4

@@ -1,7 +1,6 @@
-"""The site: links lead somewhere, every public name is in the reference, figures have one source."""
+"""The site: every public name is in the reference, figures have one source."""
 
 import re
-import runpy
 from pathlib import Path
 
 import pytest
@@ -19,23 +18,6 @@ def test_every_public_name_has_a_page_in_the_reference() -> None:
         blocks = re.findall(rf"currentmodule:: {module.__name__}\n(.*?)```", text, re.DOTALL)
         listed = re.findall(r"^   (\w+)$", "\n".join(blocks), re.MULTILINE)
         assert sorted(listed) == sorted(module.__all__)
-
-
-def test_links_that_lead_nowhere_are_found(tmp_path: Path) -> None:
-    (tmp_path / "api").mkdir()
-    (tmp_path / "index.html").write_text(
-        '<p id="top"><a href="api/a.html#there">1</a><a href="#top">2</a><a href="https://zarr.dev">3</a>'
-        '<a href="api/b.html">4</a><a href="api/a.html#gone">5</a><a href="tcp://10.0.0.1">6</a>'
-        '<img src="x.png">'
-    )
-    (tmp_path / "api" / "a.html").write_text('<a id="there" href="../index.html">up</a>')
-    broken_links = runpy.run_path(str(DOCS / "check_links.py"))["broken_links"]
-    assert [line.split(": ")[1] for line in broken_links(tmp_path)] == [
-        "api/b.html",
-        "api/a.html#gone",
-        "tcp://10.0.0.1",
-        "x.png",
-    ]
 
 
 @pytest.mark.parametrize(

@@ -68,15 +68,13 @@ _one_at_a_time = threading.Lock()
 """Held while a piece is done: threads of a Dask worker would share one renderer."""
 
 
-@lru_cache(maxsize=1)
-def _copy_of_work(pickled: bytes) -> Work:
-    return pickle.loads(pickled)
+_copy_of_work = lru_cache(maxsize=1)(pickle.loads)
 
 
-def _do_elsewhere(piece: int, pickled: bytes) -> Any:
-    """Do a piece in another process, whose copy of the work is kept for the next piece."""
+def _do_elsewhere(piece: int, pickled: bytes | None = None) -> Any:
+    """Do a piece in another process, whose copy of the work, by default that of `_begin_worker`, is kept."""
     with _one_at_a_time:
-        return _copy_of_work(pickled)(piece)
+        return _copy_of_work(pickled or _work_of_worker)(piece)
 
 
 # Local worker processes
@@ -94,12 +92,12 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
     pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
     # Not forked: what other threads hold locked would be locked for ever in the copy.
     spawning = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, spawning, _begin_worker, (threads,))
+    pool = ProcessPoolExecutor(count, spawning, _begin_worker, (threads, pickled))
     try:
         # Workers inherit the mask: Ctrl-C reaches all processes, and this one ends the others.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
-            futures = {pool.submit(_do_elsewhere, piece, pickled): piece for piece in pieces}
+            futures = {pool.submit(_do_elsewhere, piece): piece for piece in pieces}
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for future in futures:
@@ -122,11 +120,12 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
 
 
 _threads_of_worker: int | None = None
+_work_of_worker = b""
 
 
-def _begin_worker(threads: int) -> None:
-    global _threads_of_worker
-    _threads_of_worker = threads
+def _begin_worker(threads: int, pickled: bytes) -> None:
+    global _threads_of_worker, _work_of_worker
+    _threads_of_worker, _work_of_worker = threads, pickled
     threading.Thread(target=_end_with_starter, daemon=True).start()
 
 
@@ -161,8 +160,9 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
         try:
             if not client.scheduler_info()["workers"]:
                 warnings.warn(f"{address} has no worker yet: dask worker {address}", stacklevel=2)
-            # An equal job of an earlier run is another one: pickle does not read the bytes at the end.
-            pickled = dumps(work) + os.urandom(16)
+            # A task, whose result travels to each worker once; the bytes at its end, which pickle does not
+            # read, make it another one than an equal job of an earlier run.
+            pickled = client.submit(bytes, dumps(work) + os.urandom(16), pure=False)
             futures = client.map(_do_elsewhere, pieces, pickled=pickled, pure=False)
             by_future = dict(zip(futures, pieces, strict=True))
             del futures

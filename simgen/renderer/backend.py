@@ -224,6 +224,12 @@ def gathered(array: Any, index: Any, active: Any = True) -> Any:
     return load_drjit().gather(type(array), array, index, active)
 
 
+@cache
+def cuda_driver() -> str | None:
+    """File name of the CUDA driver, if there is one: looking for it starts a compiler."""
+    return ctypes.util.find_library("cuda")
+
+
 def _candidates(request: str = "") -> Iterator[Backend]:
     """The backends of this machine, or those of one kind, each tried, best first."""
     missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
@@ -232,7 +238,7 @@ def _candidates(request: str = "") -> Iterator[Backend]:
             f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
             "pip install '.[render]'"
         )
-    if request in ("", "cuda") and (driver := ctypes.util.find_library("cuda")):
+    if request in ("", "cuda") and (driver := cuda_driver()):
         yield _trial("cuda", driver, "CUDA")
     for path in _llvm_libraries() if request in ("", "llvm") else ():
         yield _trial("llvm", str(path), f"LLVM {_llvm_version(path) or ''}".strip())

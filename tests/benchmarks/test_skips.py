@@ -7,7 +7,7 @@ from benchmarks.skips import SKIPS, World
 from benchmarks.studies.skips import are_same, random_world
 
 EXACT = {skip.name: skip for skip in SKIPS if skip.exact}
-QUICK = [name for name in EXACT if name.startswith(("exploration", "visibility", "what datasets"))]
+QUICK = [name for name in EXACT if name.startswith(("exploration", "visibility"))]
 
 
 @pytest.fixture(scope="module")

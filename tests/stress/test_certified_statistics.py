@@ -16,8 +16,6 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.sections.photon_statistics import view_samples
-from pcii.types.focal_planes import FocalPlanes
 
 FAR_MM = 1e9
 
@@ -98,22 +96,3 @@ def test_sections_of_photons(name: str, dense: bool) -> None:
     assert sections.variance is not None
     assert digits(sections.estimate.item(), certified.mean) > 14
     assert digits(sqrt(sections.variance.item()), certified.deviation) > 14
-
-
-@pytest.mark.parametrize("name", ["Lottery", "NumAcc1"])
-def test_samples_of_views(name: str) -> None:
-    """Of samples that are not 0, which these are."""
-    certified = SETS[name]
-    grid = unit_grid(*certified.side, 1, 1)
-    counts = pcii.PhotonCounts.from_dense(np.array(certified.data, int).reshape(grid.shape_KLHW), grid)
-    found = view_samples(counts, FocalPlanes.at_depths(grid, FAR_MM), 0, cell_px=1, window_cells=1)
-    assert found.number.item() == len(certified.data)
-    assert digits(found.mean.item(), certified.mean) > 14
-    assert digits(sqrt(found.variance.item()), certified.deviation) > 14
-
-
-def test_the_textbook_formula_would_fail() -> None:
-    """The fault that these data are made for: mean of squares less square of the mean."""
-    data = np.array(SETS["NumAcc4"].data, dtype=np.float64)
-    textbook = (np.sum(data**2) - data.size * data.mean() ** 2) / (data.size - 1)
-    assert digits(sqrt(max(textbook, 0)), 0.1) < 3

@@ -109,15 +109,3 @@ def test_the_variance_over_views_is_right_in_bright_windows(level: int, differin
     assert found.number.item() == 9
     np.testing.assert_allclose(found.mean.item(), mean, rtol=4e-16)
     np.testing.assert_allclose(found.variance.item(), exact, rtol=1e-14)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("budget", [10**3, 10**6, 10**9, 10**12])
-def test_sums_of_the_paper_s_cameras_are_exact(budget: int) -> None:
-    """All photons of 10 x 10 views of 512 x 512 arrive where views do not shift, at any budget."""
-    grid = unit_grid(10, 10, 512, 512)
-    film = film_of(budget, grid.shape_KLHW)
-    counts = pcii.PhotonCounts.from_dense(film, grid, cfa="GRBG")
-    sections = pcii.reconstruct(counts, 1e6)
-    assert int(sections.counts.sum(dtype=np.int64)) == budget * 100
-    np.testing.assert_array_equal(sections.counts[0].sum(axis=-1), film.sum(axis=(0, 1)))

@@ -16,6 +16,7 @@ from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.evaluation.benchmark_page import COMPARISONS, write_page
 from pcii.evaluation.benchmark_scores import BenchmarkHalf, open_benchmark, run_method, score_submission
+from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.store.verification import verify
 
@@ -47,10 +48,15 @@ def submitted(data: BenchmarkHalf, tmp_path_factory: pytest.TempPathFactory) -> 
     return folder
 
 
+@pytest.fixture(scope="module")
+def scored(data: BenchmarkHalf, submitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
+    return score_submission(submitted, data, tmp_path_factory.mktemp("scored") / "given")
+
+
 def test_maps_made_elsewhere_score_as_the_method_that_made_them(
-    data: BenchmarkHalf, submitted: Path, tmp_path: Path
+    data: BenchmarkHalf, scored: Evaluation, tmp_path: Path
 ) -> None:
-    given = score_submission(submitted, data, tmp_path / "given").frame
+    given = scored.frame
     for method, name in (("variance", "mine"), ("depth:variance-sweep", "depth:mine")):
         run = run_method(method, data, tmp_path / method.replace(":", "-")).frame
         own = given[given["method"] == name].reset_index(drop=True)
@@ -64,9 +70,9 @@ def test_maps_made_elsewhere_score_as_the_method_that_made_them(
     assert own["light"].cat.categories.tolist() == [30.0, 1000.0, 3000.0, "full-light"]
     of_pair = own[own["scene"] == "pair"].groupby("light", observed=True)["identity"]
     assert of_pair.nunique().tolist() == [3, 3, 1, 1]
-    about = json.loads((tmp_path / "given" / SUBMISSION).read_text())
+    about = json.loads((scored.folder / SUBMISSION).read_text())
     assert (about["method"], about["authors"], about["half"]) == ("mine", "A. N.", HALF)
-    verify(tmp_path / "given")
+    verify(scored.folder)
     few, many = (own[own["light"] == light]["bound_px"].mean() for light in (30.0, 3000.0))
     assert few == pytest.approx(10 * many, rel=0.2)  # as the root of the photons
 
@@ -105,9 +111,9 @@ def test_functions_of_ones_own_are_run_each_into_a_folder_of_its_own(
     assert not (tmp_path / "other").exists()
 
 
-def test_one_page_has_all_submissions(data: BenchmarkHalf, submitted: Path, tmp_path: Path) -> None:
+def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, tmp_path: Path) -> None:
     folder, out = tmp_path / "submissions", tmp_path / "page.html"
-    score_submission(submitted, data, folder / "theirs")
+    shutil.copytree(scored.folder, folder / "theirs")
     run_method("depth:posterior", data, folder / "ours")
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()

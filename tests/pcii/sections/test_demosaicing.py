@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from twins import demosaic_twin
 
 from pcii.base.errors import InputError
@@ -76,7 +75,6 @@ images = st.builds(
 
 
 @given(raw=images, cfa=st.sampled_from(PATTERNS))
-@at_least(150)
 def test_demosaicing_is_eqs_4_to_6_to_the_bit(raw, cfa):
     # Halves and quarters of whole numbers are exact, so the order of additions cannot matter.
     np.testing.assert_array_equal(demosaic(raw, cfa=cfa), demosaic_twin(raw, cfa))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
@@ -26,7 +25,6 @@ patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
     double=st.booleans(),
     seed=st.integers(0, 999),
 )
-@at_least(150)
 def test_sums_and_variances_are_those_of_the_samples(
     cameras, pixels, pitch, z, cfa, channels, double, seed
 ) -> None:
@@ -59,7 +57,6 @@ def test_sums_and_variances_are_those_of_the_samples(
     most=st.sampled_from([1, 3, 10**6]),
     seed=st.integers(0, 999),
 )
-@at_least(150)
 def test_variances_of_counts_are_those_of_the_samples(cameras, pixels, z, cfa, most, seed) -> None:
     grid = unit_grid(*cameras, *pixels)
     dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
@@ -89,7 +86,6 @@ def dense_and_sparse(dense: np.ndarray, grid: CameraGrid, cfa: str | None) -> li
     cfa=st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG"]),
     seed=st.integers(0, 999),
 )
-@at_least(100)
 def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed) -> None:
     grid = unit_grid(*cameras, *pixels)
     K, L, H, W = grid.shape_KLHW

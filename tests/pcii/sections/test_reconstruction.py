@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from twins import blocky_texture, section_twin, unit_grid
 
 from pcii.sections.reconstruction import reconstruct
@@ -36,7 +35,6 @@ def photons(dense: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> Phot
 
 
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
-@at_least(150)
 def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed)
     sections = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)

@@ -8,7 +8,6 @@ import zarr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from property_settings import at_least
 from stored_datasets import flip_a_bit, one_sentence
 
 from pcii.store.folders import list_files
@@ -45,7 +44,6 @@ def test_arrays_of_any_shape_come_back_to_the_bit(tmp_path, array):
 
 
 @given(st.lists(st.integers(0, 3000), max_size=5).map(tuple))
-@at_least(200)
 def test_chunks_fit_the_array_and_the_limit(shape):
     chunks = chunk_shape(shape)
     assert len(chunks) == len(shape)

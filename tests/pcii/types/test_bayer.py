@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from twins import colour_of
 
 from pcii.base.errors import InputError
@@ -19,7 +18,6 @@ def test_a_pattern_is_named_by_its_first_two_rows(cfa, cells):
 @given(
     cfa=st.sampled_from(PATTERNS), height=st.integers(1, 7), width=st.integers(1, 7), seed=st.integers(0, 9)
 )
-@at_least(100)
 def test_a_mosaic_keeps_the_colour_that_each_pixel_sees(cfa, height, width, seed):
     rgb = np.random.default_rng(seed).integers(0, 1000, size=(2, height, width, 3))
     raw, colours = mosaic(rgb, cfa), colour_index(height, width, cfa)

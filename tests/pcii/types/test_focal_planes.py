@@ -5,7 +5,6 @@ import pytest
 from camera_grids import grids
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from twins import paper_grid, unit_grid, voxel_of
 
 from pcii.base.errors import InputError
@@ -28,7 +27,6 @@ def test_where_cameras_see_a_point_by_hand():
 
 
 @given(grid=grids, z=depths, z0=depths)
-@at_least(100)
 def test_disparity_and_blur_are_where_the_cameras_see_a_point(grid, z, z0):
     i0, j0 = project_px(grid, (0, 0, z), 0, 0)
     i1, j1 = project_px(grid, (0, 0, z), 1, 1)
@@ -62,7 +60,6 @@ def test_half_pixel_shifts_round_up_and_do_not_alternate():
 
 
 @given(grid=grids, z=st.sampled_from([250.0, 540.0, 620.0]), subpixel=st.integers(1, 3))
-@at_least(100)
 def test_voxel_indices_follow_the_contracts_formula(grid, z, subpixel):
     d_x, d_y = (float(d) for d in disparity_px(grid, z))
     rows, cols = (index[0] for index in FocalPlanes.at_depths(grid, z).voxel_indices(subpixel))
@@ -85,7 +82,6 @@ def test_where_a_camera_sees_a_point_is_sent_to_where_the_centre_sees_it(rows, c
 
 
 @given(near=st.floats(100, 900), extra=st.floats(1, 900), step=st.floats(0.5, 20))
-@at_least(100)
 def test_planes_run_from_far_to_near_in_equal_steps_of_total_disparity(near, extra, step):
     planes = FocalPlanes.between(paper_grid(), near, near + extra, step)
     steps = np.diff(planes.total_disparity_px)

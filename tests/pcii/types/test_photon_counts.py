@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from scipy.stats import poisson
 from twins import samples_of, unit_grid
 
@@ -41,7 +40,6 @@ small_counts = st.builds(
 
 
 @given(dense=small_counts, shuffle=st.integers(0, 99))
-@at_least(100)
 def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
     grid = unit_grid(*dense.shape)
     from_dense = PhotonCounts.from_dense(dense, grid, cfa="GRBG")

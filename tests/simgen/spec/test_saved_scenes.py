@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 from two_things import BALL, NAMED, SCENE, SKY
 
 from pcii.base.errors import InputError
@@ -109,7 +108,6 @@ SCENES = st.fixed_dictionaries(
 )
 
 
-@at_least(60)
 @given(values=SCENES)
 def test_any_scene_is_the_same_once_saved_and_loaded(values: dict[str, Any]) -> None:
     scene = Scene(**values)

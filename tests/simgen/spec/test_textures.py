@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from property_settings import at_least
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
@@ -268,7 +267,6 @@ TEXTURES = st.one_of(
 )
 
 
-@at_least(60)
 @given(TEXTURES, st.floats(-4, 4).map(lambda power: 10.0**power))
 def test_every_texture_is_reflectance_on_every_aspect(texture: Texture, aspect: float) -> None:
     painted = paint(texture, aspect)
