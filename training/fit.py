@@ -22,7 +22,7 @@ import torch
 from torch import Tensor, nn
 
 from pcii.depth.surface_network import WEIGHTS
-from training.examples import DEVICE, Batch, Examples
+from training.examples import DEVICE, SIDES, Batch, Examples
 from training.layers import SurfaceNetwork
 from training.requests import NOT_COUNTED
 
@@ -102,6 +102,8 @@ class Training:
                     self.minutes = minute
                     self._write(losses, examples)
                     losses.clear()
+                    examples = Examples(folder, pool)  # more may have been made in the meantime
+                    batches = examples.batches(rng, pool)
             self.minutes = minutes
             self._write(losses, examples)
 
@@ -193,7 +195,7 @@ def judge(network: SurfaceNetwork, examples: Examples) -> np.ndarray:
     wrong masks."""
     rows = []
     for file in examples.held_out:
-        batch = examples.batch([file], np.random.default_rng(0))
+        batch = examples.batch([file], max(SIDES), np.random.default_rng(0))
         batch = Batch([values.to(DEVICE) for values in batch.inputs], *(v.to(DEVICE) for v in batch[1:]))
         with torch.no_grad(), HALF_PRECISION:
             depth, masks = (part.float() for part in network(*batch.inputs))

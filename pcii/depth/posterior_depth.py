@@ -13,7 +13,7 @@ import numpy as np
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
-from pcii.depth.surface_network import MULTIPLE, network_posterior
+from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
@@ -22,12 +22,13 @@ from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
+NO_DEPTHS = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,12 @@ class PosteriorDepth:
     interpolation_blocks: float = 2.0
     """Standard deviation of the window whose evidence places the depth of radiance between two planes."""
 
-    def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
+    def __call__(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
+    ) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
         data = _without_faults(data)
-        posterior, evidence = self._posterior(data, z_range_mm)
+        posterior, evidence = self._posterior(data, z_range_mm, z_mm)
         plane, confidence, total_px = posterior.most_probable()
         if isinstance(data, Views):
             z_mm = self._between_planes_mm(evidence.nats, posterior.planes, plane)
@@ -71,22 +74,24 @@ class PosteriorDepth:
         return DepthMap(*(on_pixels(part, posterior.block_px, data.grid.shape_HW) for part in maps))
 
     def posterior_with_detection(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
     ) -> tuple[DepthPosterior, np.ndarray]:
         """The posterior of planes through the range, and the blocks (h, w) bool where a surface is detected.
 
         They are those where the depth map has an answer.
         """
         data = _without_faults(data)
-        posterior, evidence = self._posterior(data, z_range_mm)
+        posterior, evidence = self._posterior(data, z_range_mm, z_mm)
         return posterior, self._detected(data, posterior, evidence.photons, posterior.most_probable()[0])
 
-    def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
+    def posterior(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
+    ) -> DepthPosterior:
         """The posterior of planes through the range."""
-        return self._posterior(_without_faults(data), z_range_mm)[0]
+        return self._posterior(_without_faults(data), z_range_mm, z_mm)[0]
 
     def _posterior(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray
     ) -> tuple[DepthPosterior, TextureEvidence]:
         """The posterior, and the evidence that it is made of."""
         planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
@@ -97,15 +102,21 @@ class PosteriorDepth:
         h, w = evidence.nats.shape[1:]
         if isinstance(data, Views):
             probability = surface_posterior(evidence.nats, self.prior).transpose(2, 0, 1)
-            nothing = np.zeros((h, w), np.float32)
+            nothing, in_focus = np.zeros((h, w), np.float32), np.zeros((0, h, w), np.float32)
         else:
-            inputs = self.network_inputs(evidence, planes, block_px)
+            total_px = planes.total_disparity_px
+            requested_px = total_disparity_px(data.grid, z_mm)
+            inputs = self.network_inputs(evidence, planes, block_px, requested_px)
             # Where there are no photons there is no surface, and the depth map has no answer.
             probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
+            in_focus = np.zeros((z_mm.size, *nothing.shape), np.float32)
             part = self._part_with_photons(evidence.photons, block_px, nothing.shape)
             if part is not None:
-                probability[:, *part], nothing[part] = network_posterior(inputs.part(*part))
-        posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
+                requested_planes = np.interp(requested_px, total_px, np.arange(len(planes)))
+                outputs = run_network(inputs.part(*part), requested_planes)
+                probability[:, *part], nothing[part], in_focus[:, *part] = outputs
+        whole = np.s_[..., :h, :w]
+        posterior = DepthPosterior(planes, probability[whole], nothing[whole], block_px, in_focus[whole])
         return posterior, evidence
 
     def _detected(
@@ -128,9 +139,14 @@ class PosteriorDepth:
         smooth = gaussian_filter(nats, self.interpolation_blocks, axes=(1, 2))
         return peak_depth_mm(planes, plane, neighbours_of(smooth, plane))
 
-    def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
-        """What the network is given for the evidence of blocks of photon counts."""
-        hint = hint_of(planes.total_disparity_px, np.zeros(0))  # no plane is requested
+    def network_inputs(
+        self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
+    ) -> NetworkInputs:
+        """What the network is given for the evidence of blocks of photon counts.
+
+        `requested_px` (R,) are the total disparities of planes that are asked about.
+        """
+        hint = hint_of(planes.total_disparity_px, requested_px)
         return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:

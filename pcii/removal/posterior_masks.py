@@ -35,8 +35,8 @@ class PosteriorMasks:
         `steps` holds `probability` (Z, H, W) float32, that of a surface near the plane.
         """
         planes = sections.planes
-        posterior, detected = self.depth.posterior_with_detection(counts, self.range_mm(planes))
-        near = self.in_focus_probability(posterior, planes.total_disparity_px)
+        posterior, detected = self.depth.posterior_with_detection(counts, self.range_mm(planes), planes.z_mm)
+        near = posterior.in_focus
 
         masks, probability = (
             on_pixels(blocks, posterior.block_px, counts.grid.shape_HW)

@@ -86,13 +86,16 @@ class DepthPosterior(ShortForm):
 
     `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
     there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
-    total disparity. h x w are enough blocks for all pixels. Raises `InputError` for other shapes.
+    total disparity. h x w are enough blocks for all pixels. `in_focus` (R, h, w) float32 is the probability
+    that the surface belongs to an object in focus at each of R requested planes. Raises `InputError` for
+    other shapes.
     """
 
     planes: FocalPlanes
     probability: np.ndarray
     no_surface: np.ndarray
     block_px: int
+    in_focus: np.ndarray
 
     def __post_init__(self) -> None:
         h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
@@ -103,6 +106,7 @@ class DepthPosterior(ShortForm):
             )
         object.__setattr__(self, "probability", read_only(self.probability))
         object.__setattr__(self, "no_surface", read_only(self.no_surface))
+        object.__setattr__(self, "in_focus", read_only(self.in_focus))
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
