@@ -21,8 +21,8 @@ HELD_OUT = 24
 MAX_VALUES = {"cpu": 3_000_000, "cuda": 24_000_000}
 """Largest number of blocks times planes of a step."""
 SIDES = (96, 128, 192, 256)
-"""Blocks along the sides of the parts of films; those of a step are alike. Narrow things are learned from many
-small parts, wide ones and empty film from whole films."""
+"""Blocks along the sides of the parts of films; those of a step are alike. Narrow things are learned from
+many small parts, wide ones and empty film from whole films."""
 WAITING_BATCHES = 8
 """Batches that are ready before their step."""
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
