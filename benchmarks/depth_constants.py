@@ -19,6 +19,7 @@ from pcii.metrics.depth_accuracy import depth_errors
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.suggested_depths import depth_range_of
 from pcii.types.estimates import DepthMap
+from pcii.types.photon_limit import Light
 
 CHOSEN = PosteriorDepth()
 FACTORS = (0.5, 2.0)
@@ -34,7 +35,7 @@ def table() -> Iterator[str]:
         make(works, progress)
         places = list(np.ndindex(len(works), len(budgets)))
         for done, place in enumerate(places, start=1):
-            data = open_dataset(works[place[0]].folder).at_budget(budgets[place[1]])
+            data = open_dataset(works[place[0]].folder).at_light(Light(budgets[place[1]]))
             for number, (_, method) in enumerate(variants):
                 figures[number, *place] = _errors(data, method)
             progress("datasets and budgets", done, len(places))

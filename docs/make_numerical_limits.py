@@ -243,11 +243,15 @@ def _counts(level: int) -> pcii.PhotonCounts:
     return pcii.PhotonCounts.from_dense(np.full(grid.shape_KLHW, level), grid)
 
 
+def _photons(case: Case) -> float:
+    """Expected photons of a view."""
+    case.without("single", "bad depth", "beyond", "1 x 1")
+    return case.film((1,), 1e12, 1e13)[0]
+
+
 def _limited(case: Case) -> pcii.PhotonCounts:
     """Of constant light: the budget is that of the case."""
-    case.without("single", "bad depth", "beyond", "1 x 1")
-    budget = case.film((1,), 1e12, 1e13)[0]
-    return pcii.limit_photons(Case("constant").views(), budget, seed=1)
+    return pcii.limit_photons(Case("constant").views(), _photons(case), seed=1)
 
 
 def _rng() -> np.random.Generator:
@@ -393,6 +397,7 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
             lambda case, data=data: pcii.depth_posterior(data(case), case.z_range_mm),
         )
     return table | {
+        "Light": ("Light", lambda case: pcii.Light(_photons(case))),
         "limit_photons, light": (
             "limit_photons",
             _of_light(lambda case: pcii.limit_photons(case.views(), 1000, seed=1)),

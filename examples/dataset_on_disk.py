@@ -13,5 +13,5 @@ print(f"{manifest['photons']['total']} photons by {manifest['photons']['method']
 
 dataset = pcii.open_dataset(folder)
 print(dataset)
-print(dataset.at_budget(1000).counts)
+print(dataset.at_light(pcii.Light(1000)).counts)
 print(f"{pcii.verify(folder)} files are as they were written")

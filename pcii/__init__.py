@@ -32,7 +32,7 @@ from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import limit_photons
+from pcii.types.photon_limit import Light, limit_photons
 from pcii.types.section_stack import Sections
 from pcii.types.truth import Truth
 
@@ -45,6 +45,7 @@ __all__ = [
     "FocalPlanes",
     "InputError",
     "LensArray",
+    "Light",
     "Optics",
     "PhotonCounts",
     "Score",

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 from cyclopts import CoercionError, Parameter, Token
 
-from pcii.store.dataset import Dataset, budget_of, open_dataset
+from pcii.store.dataset import Dataset, open_dataset
 from pcii.types.arrays import MOST_DEPTHS
+from pcii.types.photon_limit import Light
 
 
 def depths_mm(text: str) -> list[float]:
@@ -49,7 +50,7 @@ def _all_depths_mm(kind: Any, tokens: Sequence[Token]) -> tuple[float, ...]:
 def dataset_at(folder: Path, budget: str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     dataset = open_dataset(folder)
-    return dataset if budget is None else dataset.at_budget(budget_of(budget))
+    return dataset if budget is None else dataset.at_light(Light.parse(budget))
 
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]

@@ -66,8 +66,8 @@ def origin(outcome: Outcome) -> list[tuple[str, str]]:
         ("methods", ", ".join(methods)),
         ("dataset", outcome.dataset.name),
     ]
-    if outcome.dataset.budget is not None:
-        rows.append(("photon budget", str(outcome.dataset.budget)))
+    if outcome.dataset.choice is not None:
+        rows.append(("photon budget", str(outcome.dataset.choice)))
     rows += [(key, str(manifest[key])) for key in ("origin", "licence", "citation") if manifest.get(key)]
     if manifest.get("versions"):
         rows.append(("dataset made by", _versions(manifest["versions"])))

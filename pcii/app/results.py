@@ -32,6 +32,7 @@ from pcii.base.safe_files import (
     write_json_safely,
 )
 from pcii.depth.methods import DEFAULT_METHOD
+from pcii.evaluation.rows import identity_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.store.folders import (
@@ -39,7 +40,6 @@ from pcii.store.folders import (
     RESULTS_FOLDER,
     Files,
     entries,
-    hash_json,
     list_files,
     lists_part,
     read_results,
@@ -122,9 +122,8 @@ def _only_writer(target: Path, out: Path) -> Iterator[None]:
 
 def _origin(dataset: Dataset) -> dict[str, Any]:
     """Dataset and light that results belong to, as in results.json."""
-    manifest = dataset.manifest
-    identity = manifest.identity or hash_json(manifest.files)
-    return {"dataset": dataset.name, "identity": identity, "light": dataset.budget}
+    light = dataset.choice and dataset.choice.stored
+    return {"dataset": dataset.name, "identity": identity_of(dataset.manifest), "light": light}
 
 
 def _results_of(out: Path, dataset: Dataset) -> tuple[Files, Mapping[str, str]]:

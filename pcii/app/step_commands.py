@@ -30,6 +30,7 @@ from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_limit import Light
 
 LOW_ANSWERED_SHARE = 0.1
 """A depth map that answers for a smaller share of the photons is warned of."""
@@ -189,7 +190,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
     data, manifest = open_dataset(dataset), read_results(out)
-    data = data if manifest.light is None else data.at_budget(manifest.light)
+    data = data if manifest.light is None else data.at_light(Light.parse(manifest.light))
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")

@@ -20,7 +20,7 @@ from pcii.evaluation.method_names import depth_name, estimator_of, named_method
 from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
 from pcii.evaluation.submissions import SUBMISSION, read_maps, read_submission, tasks_of_submission
-from pcii.evaluation.tasks import Task, lights_of, tasks_of
+from pcii.evaluation.tasks import Task, tasks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.collection import (
     BENCHMARK_FIELDS,
@@ -30,9 +30,10 @@ from pcii.store.collection import (
     open_collection,
     read_collection,
 )
-from pcii.store.dataset import FULL_LIGHT, Dataset, budget_of
+from pcii.store.dataset import Dataset
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.photon_limit import FULL_LIGHT, Light
 
 TYPICAL_PHOTONS = 1000.0
 """Photons per view at which scenes and times are compared: those of the paper."""
@@ -58,8 +59,7 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
         raise InputError(f"{path}: has no dataset of the {half} half; `simgen benchmark make` makes it")
     datasets = list(chosen)
     scenes = {row["path"]: row["values"]["name"] for row in chosen.rows}
-    lights = {row["path"]: row["values"]["light"] for row in chosen.rows}
-    lit = {scenes[each.name]: each for each in datasets if lights[each.name] == FULL_LIGHT}
+    lit = {scenes[each.name]: each for each in datasets if each.light == FULL_LIGHT}
     full_light = {name: lit[scene] for name, scene in scenes.items() if scene in lit}
     return BenchmarkHalf(read_collection(path).recipe["name"], half, datasets, full_light)
 
@@ -104,15 +104,13 @@ def run_method(
     there, for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_method(method)
-    requested = {budget_of(each) for each in budgets}
+    requested = {str(Light.parse(each)) for each in budgets}
     tasks: list[Task] = []
     for dataset in data.datasets:
         lights = [
             light
-            for light in lights_of(dataset)
-            if light is not None
-            and (not requested or light in requested)
-            and named.takes(full_light=light == FULL_LIGHT)
+            for light in dataset.lights
+            if (not requested or str(light) in requested) and named.takes(full_light=light == FULL_LIGHT)
         ]
         if lights:
             tasks += tasks_of([dataset], [named], lights)

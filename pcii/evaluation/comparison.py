@@ -1,5 +1,6 @@
 """Methods compared over many datasets: `pcii.evaluate`."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +17,13 @@ from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
 from pcii.evaluation.tasks import tasks_of
 from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, MARKER
+from pcii.store.dataset_layout import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH
+from pcii.types.photon_limit import Light
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+SEED = re.compile(r"(.*_)?seed_\d+")
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,8 @@ def evaluate(
     """
     folder = Path(out)
     named = named_methods(methods)
-    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
+    lights = [Light.parse(budget) for budget in budgets]
+    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, lights, z_mm)
     with writing_rows(folder) as file:
         made_again = measure(EvaluationJob(tasks), file, executor, report)
         # Scenes in the order of the datasets, those of earlier runs last.
@@ -96,7 +101,8 @@ def evaluate(
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
     """Dataset folders among `paths` and, for other folders, in them; `InputError` where there is none.
 
-    Unfinished datasets are included, so that opening them reports what is missing.
+    Unfinished datasets are included, and folders that are called seed_<n> or have a part of a dataset, so
+    that opening them reports what is missing.
     """
     folders: list[Path] = []
     for path in map(Path, paths):
@@ -107,7 +113,7 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
         elif is_collection(path):
             folders += [path / row["path"] for row in read_index(path)]
         else:
-            inside = [each for each in path.iterdir() if _is_begun(each)]
+            inside = [each for each in path.iterdir() if SEED.fullmatch(each.name) or _is_begun(each)]
             if not inside:
                 raise InputError(f"{path}: neither a finished dataset nor a folder of datasets")
             folders += sorted(inside, key=lambda each: (len(each.name), each.name))
@@ -117,4 +123,4 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def _is_begun(folder: Path) -> bool:
-    return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
+    return any((folder / part).exists() for part in (MANIFEST, MARKER, COUNTS, TRUTH, RADIANCE))

@@ -17,12 +17,13 @@ from pcii.metrics.bounds import object_bounds
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Budget, Dataset
+from pcii.store.dataset import Dataset
 from pcii.store.software import differences, machine
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import Light
 from pcii.types.section_stack import Sections
 
 
@@ -60,7 +61,7 @@ class EvaluationJob:
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self.tasks = tasks
-        self._warm: set[tuple[Budget, str]] = set()
+        self._warm: set[tuple[Light, str]] = set()
         self._software: dict[str, Mapping[str, str] | None] = {}
         self._lit_sections: tuple[str, Sections] | None = None
         """Identity of the last dataset with bounds, and the sections of its radiance."""
@@ -75,7 +76,7 @@ class EvaluationJob:
         seen, truth = data.counts_or_views, data.truth
         seconds, estimate = self.estimate(task, data)
         row = describe_dataset(data, task.z_mm) | {
-            "budget": task.light,
+            "budget": task.light.stored,
             "photons_per_view": seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None,
             "method": name,
             "seconds": None if seconds is None else round(seconds, 6),

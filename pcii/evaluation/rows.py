@@ -20,7 +20,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
-from pcii.store.dataset import Budget, Dataset
+from pcii.store.dataset import Dataset
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
 
 if TYPE_CHECKING:
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from pcii.store.manifests import DatasetManifest
 
 Row = dict[str, Any]
-Key = tuple[str, Budget, str, tuple[float, ...]]
-EXPOSURE = "by exposure"
-"""Light of datasets whose recipe has an exposure time instead of a number of photons."""
+Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
@@ -148,7 +146,7 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     records = [
         {
             "scene": labels[row["title"], row["recipe"]],
-            "light": EXPOSURE if row["budget"] is None else row["budget"],
+            "light": "by exposure" if row["budget"] is None else row["budget"],
         }
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}

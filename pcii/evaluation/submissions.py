@@ -18,10 +18,11 @@ from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError
 
 from pcii.base.errors import InputError
 from pcii.evaluation.method_names import NamedMethod, depth_name, estimator_of, named_method
-from pcii.evaluation.tasks import Task, lights_of
-from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
+from pcii.evaluation.tasks import Task
+from pcii.store.dataset import Dataset
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap
+from pcii.types.photon_limit import FULL_LIGHT
 
 SUBMISSION = "submission.json"
 DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
@@ -70,11 +71,9 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
     `InputError`, as for files that are no result of a dataset and its light.
     """
     possible = {
-        folder / dataset.name / light_folder(light) / file: Task(
-            dataset, light, NamedMethod(name, _read_as_maps)
-        )
+        folder / dataset.name / str(light) / file: Task(dataset, light, NamedMethod(name, _read_as_maps))
         for dataset in datasets
-        for light in lights_of(dataset)
+        for light in dataset.lights
         for file, name in ((MASKS, method), (DEPTH_MAP, depth_name(method)))
         if file == DEPTH_MAP or light != FULL_LIGHT
     }
@@ -95,7 +94,7 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
 
 def read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
     """Depth, or masks (Z, H, W) bool, of a task in a submission; `InputError`, naming the file."""
-    inside = folder / task.dataset.name / light_folder(task.light)
+    inside = folder / task.dataset.name / str(task.light)
     shape = task.dataset.grid.shape_HW
     if estimator_of(task.method.name) is not None:
         return _read_depth(inside / DEPTH_MAP, shape)
@@ -104,11 +103,6 @@ def read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
     if not np.isin(masks, (0, 1)).all():
         raise InputError(f"{file}: in_focus: expected 0 and 1, or bool")
     return masks.astype(bool)
-
-
-def light_folder(light: Budget) -> str:
-    """What the folder of results in a light is called, such as "1000" or "full-light"."""
-    return light if isinstance(light, str) else f"{light:.15g}"
 
 
 def _read_depth(file: Path, shape: tuple[int, int]) -> DepthMap:

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base.plain_text import in_markdown
-from pcii.evaluation.rows import EXPOSURE
 from pcii.evaluation.summary import SIGNS, lines_of, ranks
-from pcii.store.dataset import FULL_LIGHT, Budget
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -79,15 +77,13 @@ def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
     return text if np.isnan(low) else f"{text} ({low:.{digits}f} to {high:.{digits}f})"
 
 
-def light_name(light: Budget) -> str:
-    """Photons of a light, or full light, as the name of a column or plot.
+def light_name(light: float | str) -> str:
+    """A light of the frame as the name of a column or plot.
 
     >>> light_name(300.0), light_name("full-light"), light_name("by exposure")
     ('300', 'full light', 'by exposure')
     """
-    if light == FULL_LIGHT:
-        return "full light"
-    return EXPOSURE if light is None else f"{light:g}" if not isinstance(light, str) else light
+    return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
 
 
 def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:

@@ -7,9 +7,10 @@ from pcii.base.errors import InputError
 from pcii.depth.depth_planes import check_range_mm
 from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for
 from pcii.evaluation.rows import Key, identity_of
-from pcii.store.dataset import FULL_LIGHT, Budget, Dataset, budget_of
-from pcii.store.dataset_layout import RADIANCE, TRUTH
+from pcii.store.dataset import Dataset
+from pcii.store.dataset_layout import TRUTH
 from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.types.photon_limit import FULL_LIGHT, Light
 
 
 @dataclass(frozen=True)
@@ -17,25 +18,25 @@ class Task:
     """A dataset, light and method to score; `z_mm` are depths instead of those of the dataset, if any."""
 
     dataset: Dataset
-    light: Budget
+    light: Light
     method: NamedMethod
     z_mm: tuple[float, ...] = ()
 
     @property
     def key(self) -> Key:
         """Key of its row."""
-        return identity_of(self.dataset.manifest), self.light, self.method.name, self.z_mm
+        return identity_of(self.dataset.manifest), self.light.stored, self.method.name, self.z_mm
 
     @property
     def data(self) -> Dataset:
         """The dataset in this light, read anew, so that tasks keep nothing in memory."""
-        return self.dataset.at_budget(self.light)
+        return self.dataset.at_light(self.light)
 
 
 def tasks_of(
     datasets: Sequence[Dataset],
     methods: Sequence[NamedMethod],
-    lights: Sequence[float | str] = (),
+    lights: Sequence[Light] = (),
     z_mm: Sequence[float] = (),
 ) -> list[Task]:
     """The tasks, dataset by dataset, each dataset once, at the depths `z_mm` or else those of its recipe.
@@ -52,9 +53,12 @@ def tasks_of(
             )
         if dataset.grid.view_count < 2:
             raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
+        known = [dataset.at_light(light).light for light in lights] or dataset.lights
+        if not known:
+            raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
         own = [
             Task(dataset, light, method, tuple(map(float, z_mm)))
-            for light in _check_lights(dataset, lights)
+            for light in dict.fromkeys(known)
             for method in methods or _methods_for(dataset, light, z_mm)
             if method.takes(full_light=light == FULL_LIGHT)
         ]
@@ -64,23 +68,7 @@ def tasks_of(
     return [task for own in tasks.values() for task in own]
 
 
-def lights_of(dataset: Dataset) -> list[Budget]:
-    """Photon budgets of a dataset, and full light if it has radiance."""
-    return [*dataset.budgets, *([FULL_LIGHT] if dataset.has(RADIANCE) else [])]
-
-
-def _check_lights(dataset: Dataset, lights: Sequence[float | str]) -> list[Budget]:
-    """The lights to score at, or all of the dataset; `InputError` for one that is not there."""
-    chosen: list[Budget] = [budget_of(light) if isinstance(light, str) else light for light in lights]
-    for light in chosen:
-        dataset.at_budget(light)
-    known = chosen or lights_of(dataset)
-    if not known:
-        raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
-    return list(dict.fromkeys(known))
-
-
-def _methods_for(dataset: Dataset, light: Budget, z_mm: Sequence[float]) -> list[NamedMethod]:
+def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[NamedMethod]:
     # Removal is of sections at depths that are named.
     has_planes = bool(z_mm or dataset.analysis.get("z_mm"))
     names = methods_for(full_light=light == FULL_LIGHT)

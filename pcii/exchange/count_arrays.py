@@ -31,6 +31,8 @@ FRAMES_AT_ONCE = 255
 MIN_COLUMN_MEAN = 10
 """Mean number of counts of a column from which a column without any is warned of; by chance it is one in
 e^10. If it is smaller, dim captures are warned of without a reason."""
+EXACT = tuple(kind for kind in VIEWS if kind != "JPEG")
+"""Kinds of pictures that keep photon counts."""
 MIN_JUDGED_BYTES = 100
 """Number of bytes above 0 from which they are tested for packed bits. If it is smaller, chance decides."""
 
@@ -54,14 +56,14 @@ def import_arrays(
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
     views = order.arrange(_by_camera(numbers, name, grid, order, "H, W[, C]"))
+    if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
+        raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
     if views.ndim == 4:
         if grid is None and views.shape[3] in (3, 4):
             raise InputError(f"{name}: has the shape {numbers.shape}; give --grid if it is (N, H, W, C)")
         views = views[..., None]
     if views.ndim != 5 or 0 in views.shape or views.shape[4] not in (1, 3):
         raise InputError(f"{name}: expected (K, L, H, W) or (K, L, H, W, 1 or 3), got {numbers.shape}")
-    if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
-        raise InputError(f"{name}: expected float, uint8 or uint16, got {views.dtype}")
     if views.dtype.kind == "u" and encoding is None:
         raise InputError(
             f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
@@ -91,8 +93,8 @@ def import_counts(
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
     An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file of N
-    frames (N, H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
+    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file
+    (N, H, W) or (H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
     `import_images`. An array, or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W);
     with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W). With `bitpack` arrays have frames of bits, eight
     pixels in a byte, whose rows are `width` pixels wide, by default all bits. `frames` are the first and the
@@ -143,6 +145,7 @@ def import_counts(
             if not is_binary:
                 if number == 0 and start == begin:
                     _warn_of_packed_bytes(name, piece, tell)
+                    _warn_of_multiples(name, whole_counts(name, piece), tell)
                 sums[camera] += whole_counts(stack.name, piece).sum(axis=0, dtype=np.uint64)
             else:
                 bits = np.unpackbits(piece, axis=2) if bitpack else piece.view(np.uint8)
@@ -184,6 +187,13 @@ def _warn_of_packed_bytes(name: str, numbers: np.ndarray, tell: Tell) -> None:
         tell(f"warning: {name} looks like bits packed eight to a byte; if so, import again with --bitpack")
 
 
+def _warn_of_multiples(name: str, numbers: np.ndarray, tell: Tell) -> None:
+    """Warn of counts that are all multiples of a number, such as of binary pictures of 0 and 255."""
+    step = int(np.gcd.reduce(numbers, axis=None))
+    if step > 1 and np.count_nonzero(numbers) * np.log(step) > 20:  # by chance it is one in e^20
+        tell(f"warning: all numbers of {name} are multiples of {step}; if that is one photon, divide by it")
+
+
 def _warn_of_dark_columns(sums: np.ndarray, option: str, tell: Tell) -> None:
     """Warn of columns at the end of packed rows without a count in any view."""
     columns = sums.sum(axis=(0, 1, 2), dtype=np.int64)
@@ -199,18 +209,19 @@ def _by_camera(
     numbers: np.ndarray, name: str, grid: tuple[int, int] | None, order: ViewOrder, axes: str
 ) -> np.ndarray:
     """An array as (A, B, ...), the table of views as stored; of a `grid` its first axis counts the views."""
+    if numbers.ndim < (4 if grid is None else 3):
+        raise InputError(f"{name}: expected (K, L, {axes}), or with --grid (N, {axes}), got {numbers.shape}")
     if grid is None:
         return numbers
-    if numbers.ndim < 3:
-        raise InputError(f"{name}: expected (N, {axes}) with --grid, got {numbers.shape}")
     return numbers.reshape(*order.table_of(name, numbers.shape[0], grid), *numbers.shape[1:])
 
 
 def _frames_of(path: Path) -> np.ndarray:
     """The frames (T, H, row) of a view: pages of a picture, or a .npy file, which is mapped into memory."""
     if is_picture(path):
-        return _without_colours(path, np.stack([*decode(picture_of(path, VIEWS))]))
+        return _without_colours(path, np.stack([*decode(picture_of(path, EXACT))]))
     numbers = map_array(path)
+    numbers = numbers[None] if numbers.ndim == 2 else numbers
     return numbers[..., 0] if numbers.ndim == 4 and numbers.shape[3] == 1 else numbers  # one channel
 
 
@@ -252,7 +263,7 @@ def _stacks_of(
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
 
     def arrange(numbers: np.ndarray) -> np.ndarray:
-        views = order.arrange(_by_camera(numbers, name, grid, order, "H, W) or (N, T, H, W"))
+        views = order.arrange(_by_camera(numbers, name, grid, order, "[T,] H, W"))
         return views[:, :, None] if views.ndim == 4 and not bitpack else views
 
     def load(camera: tuple[int, int]) -> np.ndarray:
@@ -278,8 +289,8 @@ def map_array(path: Path) -> np.ndarray:
         raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
     except MemoryError:
         raise
-    except Exception as fault:  # damaged headers raise various exceptions
-        raise InputError(f"{path}: not a NumPy array ({visible(str(fault))})") from None
+    except Exception:  # damaged headers raise various exceptions
+        raise InputError(f"{path}: not an array of numbers in a .npy file, as numpy.save writes it") from None
     if not isinstance(numbers, np.ndarray):
         raise InputError(f"{path}: is an archive; save a .npy file, which is read piece by piece")
     return numbers

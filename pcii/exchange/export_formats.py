@@ -33,6 +33,7 @@ from pcii.store.collection import Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import check_free
 from pcii.types.photon_counts import FrameEvents
+from pcii.types.photon_limit import Light
 from pcii.types.truth import OPTIONAL_MAPS, Truth
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events"]
@@ -72,7 +73,7 @@ def export_dataset(
     folder.parent.mkdir(parents=True, exist_ok=True)
 
     def write(one: Dataset, place: Path) -> None:
-        WRITERS[format](one if budget is None else one.at_budget(budget), place)
+        WRITERS[format](one if budget is None else one.at_light(Light(budget)), place)
 
     with named_in_errors(folder), new_folder_safely(folder) as temporary:
         if isinstance(dataset, Dataset):
@@ -103,7 +104,7 @@ def write_events(dataset: Dataset, folder: Path) -> None:
     values["frame"] = counts.frame
     for name in ("z_mm", "z_range_mm"):
         values[f"analysis_{name}"] = dataset.analysis.get(name) or None
-    values["photon_budget"] = dataset.photon_budget or None
+    values["photon_budget"] = dataset.light.photons
     if dataset.truth is not None:
         values |= _truth_arrays(dataset.truth)
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
@@ -146,8 +147,8 @@ def write_photon_cubes(dataset: Dataset, folder: Path) -> None:
         (view / TRANSFORMS).write_text(json.dumps(alone, allow_nan=False) + "\n")
         frames.append({"file_path": f"{view.name}/{FRAMES}"} | poses[number])
     document = intrinsics | packing | {"num_frames": frame_count}
-    if dataset.photon_budget is not None:
-        document["photon_budget"] = float(dataset.photon_budget)
+    if dataset.light.photons is not None:
+        document["photon_budget"] = dataset.light.photons
     (folder / TRANSFORMS).write_bytes(json_bytes(document | {"frames": frames}))
 
 

@@ -33,6 +33,7 @@ from pcii.types.truth import Truth
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"
+VIEW = re.compile(r"input_cam.*\.png", re.IGNORECASE)
 DEPTH, DISPARITY = "gt_depth_lowres.pfm", "gt_disp_lowres.pfm"
 README = "README.txt"
 LARGEST_PARAMETERS_BYTES = 1 << 16
@@ -105,8 +106,8 @@ def import_hci(
             raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
         truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {})
         tell(f"with the true depth of the virtual centre, {maps[0]}")
-    files = {path.name for path in root.iterdir() if path.is_file() and not path.match("input_Cam*.png")}
-    unused = sorted(files - {PARAMETERS, *maps[:1]})
+    files = {path.name for path in root.iterdir() if path.is_file()}
+    unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})
     if unused:
         tell(f"not used: {listed_names(unused)}")
     if known.texts:
@@ -119,10 +120,12 @@ class _Parameters:
 
     def __init__(self, path: Path) -> None:
         content = read_small(path, LARGEST_PARAMETERS_BYTES, "the benchmark's folders have it")
-        parser = configparser.ConfigParser(interpolation=None, strict=False)
+        parser = configparser.ConfigParser(
+            interpolation=None, strict=False, inline_comment_prefixes=("#", ";")
+        )
         try:
-            parser.read_string(content.decode("utf-8-sig"))
-        except (configparser.Error, UnicodeDecodeError) as fault:
+            parser.read_string(content.decode("utf-8-sig", "replace"))
+        except configparser.Error as fault:
             sentence = visible(" ".join(str(fault).split()))
             raise InputError(f"{path}: not a file of parameters ({sentence})") from None
         self.path = path

@@ -157,7 +157,7 @@ def files_by_camera(
     for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
         name = path.relative_to(folder).as_posix()
         match = expression.fullmatch(name)
-        if match is None or not path.is_file():
+        if match is None or not path.is_file() or path.name.startswith("."):
             others += [name] if path.is_file() and not path.name.startswith(".") else []
             continue
         view = tuple(int(match[name]) for name in names)

@@ -118,6 +118,10 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
             return import_posed_cubes if has_cubes else import_posed_pictures
         if (source / PARAMETERS).is_file():
             return import_hci
+    if source.is_dir() and options["lens_array"] is not None:
+        raise InputError(
+            f"{source}: is a folder; --lens-array is for one picture, which holds all lens images"
+        )
     if source.is_dir() and pattern is None:
         raise InputError(f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"')
     if not source.is_dir() and pattern is not None:
@@ -153,9 +157,11 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
     result = reader(source, **{name: values[name] for name in parameters})
     known = result if isinstance(result, KnownViews) else None
     encoding = f", decoded by {values['encoding']}" if values.get("encoding") else ""
+    count = result.readout.frames if isinstance(result, PhotonCounts) else None
+    frames = f", {count} frames" if count is not None and count > 1 else ""
     return Imported(
         result.views if isinstance(result, KnownViews) else result,
-        f"{what} of {source.resolve().name}{encoding}",
+        f"{what} of {source.resolve().name}{encoding}{frames}",
         states_cameras="optics" not in parameters,
         truth=known and known.truth,
         z_range_mm=known and known.z_range_mm,

@@ -30,7 +30,12 @@ STARTS = {
 }
 PILLOW_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I;16", "F")
 TIFF_KINDS = ("MINISBLACK", "RGB", "CFA", "YCBCR")
-TIFF_TYPES = ("bool", "uint8", "uint16", "float16", "float32", "float64")
+LIGHT_TYPES = ("uint8", "uint16", "float16", "float32", "float64")
+TIFF_TYPES = (*LIGHT_TYPES, "bool", "uint32", "int16", "int32")
+SRGB_GAMMA = 0.45455
+"""What a PNG file of sRGB may state as its gamma."""
+SRGB_PRIMARIES = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+"""Chromaticities (x, y) of red, green, blue and white, as an EXR file may state them."""
 UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
 Encoding = Literal["srgb", "linear"] | float
@@ -135,8 +140,8 @@ def decode(picture: Picture) -> Iterator[np.ndarray]:
 
 def radiance_of(picture: Picture, pixels: np.ndarray, encoding: Encoding | None) -> np.ndarray:
     """Linear radiance (H, W, C), float32, of a picture's pixels."""
-    if picture.dtype == np.bool_:
-        raise InputError(f"{picture.path}: has one bit per pixel, which is a photon count; use --counts")
+    if picture.dtype.name not in LIGHT_TYPES:
+        raise InputError(f"{picture.path}: {picture.dtype} is no type of light; photon counts need --counts")
     try:
         return to_radiance(pixels, encoding, picture.most)
     except InputError as fault:
@@ -187,11 +192,14 @@ def _read_pillow(path: Path) -> Picture:
     with warning_off, Image.open(path, formats=("PNG", "JPEG", "PPM")) as image:
         stored = str(image.tile[0].args) if image.format == "PNG" else ""
         if image.mode not in PILLOW_MODES or stored in ("L;2", "L;4"):
-            raise InputError(f"a {stored or image.mode} picture; save it as RGB or 8-bit grey")
+            raise InputError(f"a picture of the kind {stored or image.mode}; save it as RGB or 8-bit grey")
         count, alpha = getattr(image, "n_frames", 1), image.has_transparency_data
         if count != 1 and image.format != "MPO":  # a telephone's JPEG may have a preview
             raise InputError(f"holds {count} pictures; give a file with one")
         unused = f"{count - 1} more pictures" if count != 1 else _profile(image.info.get("icc_profile"))
+        gamma = image.info.get("gamma", SRGB_GAMMA)
+        if "srgb" not in image.info and abs(gamma - SRGB_GAMMA) > 0.01 and not unused:
+            unused = f"the gamma of {gamma:g}"
         image.load()  # a PNG may have its orientation after its pixels
         orientation = image.getexif().get(0x0112, UPRIGHT)
         if stored.endswith("16B"):  # of which Pillow keeps 8 bits
@@ -203,6 +211,8 @@ def _read_pillow(path: Path) -> Picture:
             pixels = np.array(image.convert(kind + "A" * alpha))
         else:
             pixels = np.array(image)
+        if image.format == "PPM":  # a PFM file, whose numbers are multiplied by its scale
+            pixels = pixels * np.float32(image.info["scale"])
     pixels = pixels.reshape(1, *pixels.shape[:2], -1)
     return Picture(path, pixels, alpha, None, orientation, unused)
 
@@ -212,15 +222,18 @@ def _read_tiff(path: Path) -> Picture:
     from tifffile import TiffFile
 
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # faults are raised, not logged
-    with TiffFile(path) as file:
+    with TiffFile(path, _multifile=False) as file:  # other files of an OME set are other views
         series: list[Any] = list(file.series)
         page = series[0].keyframe
         height, width, samples = page.imagelength, page.imagewidth, page.samplesperpixel
         kind = getattr(page.photometric, "name", page.photometric)
         if kind not in TIFF_KINDS:
-            raise InputError(f"a TIFF picture of the kind {kind}; save it as RGB or grey")
+            raise InputError(f"a TIFF picture of the kind {kind}; save it as RGB or as grey whose 0 is black")
         if str(page.dtype) not in TIFF_TYPES:
             raise InputError(f"has pixels of the type {page.dtype}; save it in 8 or 16 bits, or as float32")
+        calibration = file.imagej_metadata or {}
+        if (calibration.get("c0", 0), calibration.get("c1", 1)) != (0, 1):
+            raise InputError("has a calibration of ImageJ (c0, c1); change its type to 32 bits there first")
         if sum(one.nbytes for one in series) > LARGEST_BYTES:
             raise InputError(f"its pages are more than {LARGEST_BYTES >> 30} GiB")
         if len({(one.keyframe.shape, one.dtype) for one in series}) != 1:
@@ -255,9 +268,9 @@ def _read_exr(path: Path) -> Picture:
     with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True, header_only=True) as file:
         if len(file.parts) != 1:
             raise InputError(f"has {len(file.parts)} parts; save each as a picture of its own")
-        window, display = (
-            np.ravel(file.parts[0].header[name]).tolist() for name in ("dataWindow", "displayWindow")
-        )
+        header = file.parts[0].header
+        window, display = (np.ravel(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
+        primaries = header.get("chromaticities", SRGB_PRIMARIES)
     if window != display:
         raise InputError("its data window is not its display window; save the whole picture")
     with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
@@ -269,4 +282,6 @@ def _read_exr(path: Path) -> Picture:
         alpha, others = "A" in channels, sorted({*channels} - {*colours, "A"})
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
     unused = f"the channels {', '.join(others)}"[:80] if others else ""
+    if not np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3):
+        unused += " and the chromaticities" if unused else "the chromaticities"
     return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=unused)

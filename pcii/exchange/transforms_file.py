@@ -34,6 +34,7 @@ ROUNDING = 1e-9
 PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 """Values of camera_model that, without distortion, are pinholes."""
 DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye")
+FOCAL = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
 """Endings that NeRF's own files leave out of the names of pictures."""
 
@@ -56,14 +57,14 @@ class _Lens(BaseModel):
     camera_angle_y: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_model: str | None = None
     is_fisheye: bool | None = None
-    k1: Number = 0
-    k2: Number = 0
-    k3: Number = 0
-    k4: Number = 0
-    k5: Number = 0
-    k6: Number = 0
-    p1: Number = 0
-    p2: Number = 0
+    k1: Number | None = None
+    k2: Number | None = None
+    k3: Number | None = None
+    k4: Number | None = None
+    k5: Number | None = None
+    k6: Number | None = None
+    p1: Number | None = None
+    p2: Number | None = None
     distortion_params: list[Number] | None = None
 
 
@@ -179,7 +180,7 @@ def _parsed(file: Path) -> _Document:
     """The document of a file; `InputError` with the first member that is wrong."""
     content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
     try:
-        return _Document.model_validate(json.loads(content.decode("utf-8-sig")))
+        return _Document.model_validate(json.loads(content))
     except ValidationError as fault:
         first = fault.errors()[0]
         place = ".".join(str(step) for step in first["loc"])
@@ -213,10 +214,11 @@ def _lens(file: Path, place: str, top: _Lens, frame: _Lens) -> tuple[int, int, f
             "undistorted first"
         )
     focal_px: list[float] = []
+    lens = frame if any(getattr(frame, name) for name in FOCAL) else top
     for axis, size in (("x", stated["w"]), ("y", stated["h"])):
-        angle = stated[f"camera_angle_{axis}"]
-        if stated[f"fl_{axis}"] or angle:
-            focal_px.append(stated[f"fl_{axis}"] or size / 2 / math.tan(angle / 2))
+        length, angle = getattr(lens, f"fl_{axis}"), getattr(lens, f"camera_angle_{axis}")
+        if length or angle:
+            focal_px.append(length or size / 2 / math.tan(angle / 2))
     if not focal_px:
         raise InputError(f"{file}: fl_x: missing; the focal length in pixels, or camera_angle_x")
     across, down = focal_px[0], focal_px[-1]
@@ -235,6 +237,7 @@ def _pose(file: Path, number: int, rows: Iterable[list[float]]) -> np.ndarray:
     """The checked matrix (4, 4) of a frame, its rotation the nearest exact one."""
     member = f"{file}: frames.{number}.transform_matrix"
     matrix = [list(row) for row in rows]
+    matrix += [[0.0, 0.0, 0.0, 1.0]] * (len(matrix) == 3)  # which some leave out
     if [len(row) for row in matrix] != [4] * 4 or matrix[3] != [0, 0, 0, 1]:
         raise InputError(f"{member}: expected four rows of four numbers, the last one 0 0 0 1")
     pose = np.array(matrix, np.float64)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,30 +30,13 @@ from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LA
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import EXPOSURE, FULL_LIGHT, Light
 from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 
 if TYPE_CHECKING:
     from pcii.store.manifests import DatasetManifest
 
 SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
-FULL_LIGHT: Final = "full-light"
-"""Stands for the photon budget where the radiance is looked at."""
-Budget = float | Literal["full-light"] | None
-"""Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
-
-
-def budget_of(text: str) -> float | Literal["full-light"]:
-    """A budget as people write it; raises `InputError` for what is neither a number nor `FULL_LIGHT`.
-
-    >>> budget_of("300"), budget_of("full-light")
-    (300.0, 'full-light')
-    """
-    if text == FULL_LIGHT:
-        return FULL_LIGHT
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"budget: expected a number of photons or {FULL_LIGHT!r}, got {text!r}") from None
 
 
 class StoredRadiance:
@@ -91,8 +74,8 @@ class Dataset(ShortForm):
 
     path: Path
     manifest: "DatasetManifest"
-    budget: Budget = None
-    """Nested photon budget of `counts`; None for the budget of the recipe; `FULL_LIGHT` for no counts."""
+    choice: Light | None = None
+    """The light of a nested budget, or full light; None for all photons or, without any, the radiance."""
 
     @property
     def grid(self) -> CameraGrid:
@@ -110,40 +93,43 @@ class Dataset(ShortForm):
             "name": self.name,
             "shape": times(self.grid.shape_KLHW),
             "cfa": self.cfa,
-            "budgets": listed([budget or "exposure" for budget in self.budgets]) if self.budgets else None,
+            "budgets": listed(self._counted) if self._counted else None,
             "z_mm": listed(self.analysis.get("z_mm") or ()),
             "has": listed([name for name, part in parts.items() if self.has(part)]),
         }
 
-    @property
-    def budgets(self) -> tuple[float | None, ...]:
-        """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure."""
+    @cached_property
+    def _counted(self) -> tuple[Light, ...]:
+        """The lights that photons are stored of: nested budgets, then that of all photons."""
         if not self.has(COUNTS):
             return ()
-        photons = self.manifest.recipe.get("photons", {})  # those of others state their budget alone
-        largest = None if photons.get("scope") == "exposure" else photons.get("budget")
-        return (*sorted(photons.get("nested") or []), self.manifest.photon_budget or largest)
+        stated = self.manifest.recipe.get("photons", {})  # the datasets of others state their budget alone
+        scope = stated.get("scope") or "view"
+        most = self.manifest.photon_budget or stated.get("budget")
+        if scope == "exposure" or most is None:
+            return (EXPOSURE,)
+        return tuple(Light(photons, scope) for photons in (*sorted(stated.get("nested") or []), most))
 
     @property
-    def photon_budget(self) -> float | None:
-        """Photon budget of `counts`; None without counts, for those of an exposure, and if it is unknown."""
-        if not self.has_counts or self.budget == FULL_LIGHT:
-            return None
-        return self.budgets[-1] if self.budget is None else self.budget
+    def lights(self) -> tuple[Light, ...]:
+        """All its lights: nested budgets, that of all photons, and full light if it has radiance."""
+        return (*self._counted, *([FULL_LIGHT] if self.has(RADIANCE) else []))
 
-    def at_budget(self, budget: Budget) -> "Dataset":
-        """The dataset with the photons of one of its `budgets`, or with its radiance alone ("full-light").
+    @property
+    def light(self) -> Light:
+        """The light of `counts`, or full light if there are none."""
+        return self.choice or (self._counted or (FULL_LIGHT,))[-1]
 
-        Raises `InputError` for another budget, and for full light of a dataset without radiance.
+    def at_light(self, light: Light) -> "Dataset":
+        """The dataset with the photons of one of its `lights`, or with its radiance alone.
+
+        The scope is its own, whatever that of `light`. Raises `InputError` for a light that is not there.
         """
-        if budget == FULL_LIGHT and not self.has(RADIANCE):
-            raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
-        budgets = self.budgets or (None,)
-        if budget not in (*budgets, FULL_LIGHT):
-            known = ", ".join(f"{n:g}" for n in budgets if n is not None) or "none"
-            missing = str(budget).removesuffix(".0")
-            raise InputError(f"{self.path}: no photons of budget {missing} here; there are {known}")
-        return replace(self, budget=None if budget == budgets[-1] else budget)
+        for own in self.lights:
+            if str(own) == str(light):
+                return replace(self, choice=None if own in self._counted[-1:] else own)
+        known = ", ".join(map(str, self.lights)) or "none"
+        raise InputError(f"{self.path}: has no budget {light}; there are {known}")
 
     @property
     def name(self) -> str:
@@ -155,20 +141,20 @@ class Dataset(ShortForm):
         """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests; empty if none."""
         return self.manifest.analysis or {}
 
-    @property
-    def _counts_name(self) -> str | None:
-        return None if self.budget == FULL_LIGHT else nested_name(COUNTS, self.budget)
+    def _part(self, name: str) -> str:
+        """Name of the counts, or of their truth, at this light."""
+        return nested_name(name, self.choice and self.choice.photons)
 
     @property
     def has_counts(self) -> bool:
         """Whether the dataset has photon counts; without them it may have radiance."""
-        return self._counts_name is not None and self.has(self._counts_name)
+        return self.light != FULL_LIGHT and self.has(self._part(COUNTS))
 
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; raises `InputError` if the dataset has none."""
-        part = self._counts_name
-        if part is None or not self.has_counts:
+        part = self._part(COUNTS)
+        if not self.has_counts:
             raise InputError(
                 f"{self.path}: this light has no photon counts; import the images with --photons N, or "
                 "generate the dataset with products.counts = true"
@@ -212,8 +198,8 @@ class Dataset(ShortForm):
         return self._arrays(TRUTH, TRUTH_LABELS, (name,))[name]
 
     def _photon_truth(self) -> PhotonTruth | None:
-        part = None if self.budget == FULL_LIGHT else nested_name(PHOTON_TRUTH, self.budget)
-        if part is None or not self.has(part):
+        part = self._part(PHOTON_TRUTH)
+        if not self.has_counts or not self.has(part):
             return None
         origins = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
         events = self.counts.events

@@ -72,8 +72,8 @@ def save_dataset(
     from pcii.store.manifests import DatasetManifest, validated
 
     counts, views = _counts_and_views(images)
-    if photon_budget is not None and not (counts is not None and photon_budget > 0):
-        raise InputError("photon_budget: expected photons above 0, of images that are photon counts")
+    if photon_budget is not None and counts is None:
+        raise InputError("photon_budget: is for images that are photon counts")
     stated: dict[str, Any] = {"title": title, "licence": licence, "citation": citation, "origin": origin}
     if radiance_unit is not None:
         stated["radiance_unit"] = radiance_unit

@@ -25,6 +25,7 @@ from pcii.types.arrays import MOST_DEPTHS
 from pcii.types.bayer import check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_counts import MOST_BITS, MOST_FRAMES
+from pcii.types.photon_limit import MOST_PHOTONS, Scope
 
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -66,7 +67,7 @@ def _camera_grid(value: Any) -> CameraGrid:
 Real = Annotated[float, Field(strict=False)]
 Text = Annotated[Any, AfterValidator(_text)]
 Seconds = Annotated[Real, Field(ge=0)]
-Photons = Annotated[Real, Field(ge=0, le=1 << 62)]  # sums of more may not fit in 64 bits
+Photons = Annotated[Real, Field(gt=0, le=MOST_PHOTONS)]
 Depth = Annotated[Real, Field(gt=0)]
 ObjectId = Annotated[int, Field(strict=False, gt=-(10**9), lt=10**9)]
 
@@ -92,7 +93,7 @@ class RecipePhotons(TypedDict, total=False):
     """Photon budgets of the recipe."""
 
     __pydantic_config__ = OPEN  # type: ignore[misc]
-    scope: str | None
+    scope: Scope | None
     budget: Photons | None
     nested: list[Photons] | None
 

@@ -1,11 +1,11 @@
 """The light of a dataset, and photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 
-The light of a scope is normalised to 1 and multiplied by a budget of photons: the expected photons of each
-pixel. A scope is a view, each colour of a view, or all views.
+The radiance of a scope is normalised to 1 and multiplied by the photons of a light: the expected photons of
+each pixel.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -18,28 +18,56 @@ from pcii.types.photon_counts import PhotonCounts
 
 MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""
-
-
-Scope = Literal["view", "channel", "scene"]
+Scope = Literal["view", "channel", "scene", "exposure", "full-light"]
 
 
 @dataclass(frozen=True)
 class Light:
     """The light of a dataset: `photons` expected in each `scope`.
 
-    A scope is a "view", a colour of a view ("channel") or all views ("scene"). Raises `InputError` for a
-    number that is not above 0 or is larger than 10^12.
+    A scope is a "view", a colour of a view ("channel") or all views ("scene"). `photons` is None for an
+    "exposure", whose photons nobody states, and for "full-light", the radiance. Raises `InputError` for a
+    number that is not above 0 or is larger than 10^12, and for one that such a scope does not have.
     """
 
-    photons: float
+    photons: float | None
     scope: Scope = "view"
 
     def __post_init__(self) -> None:
-        is_number = isinstance(self.photons, int | float | np.number) and not isinstance(self.photons, bool)
-        if not is_number or not 0 < self.photons <= MOST_PHOTONS:
-            raise InputError(
-                f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {self.photons!r}"
-            )
+        n, is_valid, expected = self.photons, self.photons is None, "None"
+        if self.scope not in ("exposure", "full-light"):
+            is_valid = isinstance(n, int | float | np.number) and n is not True and 0 < n <= MOST_PHOTONS
+            expected = f"a number above 0 and up to {MOST_PHOTONS:g}"
+        if not is_valid:
+            raise InputError(f"photons: expected {expected}, got {n!r}")
+
+    @classmethod
+    def parse(cls, text: float | str) -> Self:
+        """A light as people and files state it: a number of photons, "full-light" or "exposure".
+
+        Of a number the scope is a view. Raises `InputError` for anything else.
+
+        >>> Light.parse("300"), str(Light.parse("300")), Light.parse("full-light") == FULL_LIGHT
+        (Light(photons=300.0, scope='view'), '300', True)
+        """
+        if text in ("full-light", "exposure"):
+            return cls(None, text)
+        try:
+            photons = float(text)
+        except ValueError:
+            raise InputError(f"budget: expected a number of photons or 'full-light', got {text!r}") from None
+        return cls(photons)
+
+    @property
+    def stored(self) -> float | str | None:
+        """The light as files have it: its photons, None for an exposure, or "full-light"."""
+        return self.scope if self == FULL_LIGHT else self.photons
+
+    def __str__(self) -> str:
+        return self.scope if self.photons is None else f"{self.photons:.12g}"
+
+
+EXPOSURE, FULL_LIGHT = Light(None, "exposure"), Light(None, "full-light")
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
@@ -77,6 +105,7 @@ def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.nd
     """
     if not np.all(np.isfinite(energies)):
         raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
+    assert light.photons is not None  # of a scope that is normalised
     # The energy of the scope of each pixel, or of all.
     own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
     with np.errstate(over="ignore"):

@@ -20,11 +20,12 @@ from pcii.evaluation.tasks import tasks_of
 from pcii.metrics.bounds import object_bounds
 from pcii.removal.methods import removal_methods
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import FULL_LIGHT, Dataset, open_dataset
+from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_writer import save_dataset
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import Light
 from pcii.types.truth import Truth
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
@@ -34,6 +35,7 @@ IDS = np.zeros((40, 48), np.int16)
 IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
 OF_COUNTS = ["depth:posterior", "depth:focus", "depth:likelihood-sweep", "depth:variance-sweep"]
+FULL_LIGHT = "full-light"
 OF_VIEWS = ["depth:posterior", "depth:variance-sweep", "depth:structure-tensor"]
 
 
@@ -44,7 +46,7 @@ def saved(path: Path, images: Any, **depths: Any) -> Dataset:
 
 def chosen(datasets: list[Dataset], *methods: str, lights: Sequence[Any] = ()) -> list[tuple[str, Any, str]]:
     tasks = tasks_of(datasets, named_methods(methods), lights)
-    return [(task.dataset.name, task.light, task.method.name) for task in tasks]
+    return [(task.dataset.name, task.light.stored, task.method.name) for task in tasks]
 
 
 def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Path) -> None:
@@ -63,7 +65,7 @@ def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Pat
         ("both", None, "variance"),
         ("both", FULL_LIGHT, "depth:variance-sweep"),
     ]
-    assert chosen([nested], "depth", lights=["20"]) == [("nested", NESTED, "depth:posterior")]
+    assert chosen([nested], "depth", lights=[Light(20)]) == [("nested", NESTED, "depth:posterior")]
 
 
 def test_full_light_is_a_budget_by_name_and_depth_means_the_default(
@@ -92,7 +94,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
         out = tmp_path / str(number)
         asked = [command, *at_light, option, "structure-tensor", "-o", str(out)]
         assert command_line.run(cli.app, asked) == 0
-        _, depth = load_estimates(out, both.at_budget(FULL_LIGHT))
+        _, depth = load_estimates(out, both.at_light(Light.parse(FULL_LIGHT)))
         assert depth is not None
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
     capsys.readouterr()
@@ -104,10 +106,8 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
     ("has", "methods", "budgets", "sentence"),
     [
         ("counts", ["depth:structure-tensor"], [], "'depth:structure-tensor' needs radiance, and of .*; use"),
-        ("both", ["depth:structure-tensor"], [OWN], "no photons of budget 50"),
         ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
-        ("views", ["depth:focus"], [], "use depth:posterior, depth:variance-sweep, depth:structure-tensor$"),
-        ("counts", [], [FULL_LIGHT], "has no radiance, and budget 'full-light' is of that"),
+        ("counts", [], [FULL_LIGHT], "has no budget full-light; there are exposure"),
     ],
 )
 def test_what_a_method_cannot_take_is_refused_before_any_work(
@@ -120,14 +120,12 @@ def test_what_a_method_cannot_take_is_refused_before_any_work(
     assert not (tmp_path / "out").exists()
 
 
-def test_without_depths_of_planes_removal_is_left_out(tmp_path: Path) -> None:
+def test_depths_that_are_missing_or_too_near(tmp_path: Path) -> None:
+    """Without planes removal is left out, and refused by name; a range that cannot be searched is refused."""
     ranged = saved(tmp_path / "ranged", COUNTS, z_range_mm=(450, 800))
     assert chosen([ranged]) == [("ranged", None, name) for name in OF_COUNTS]
     with pytest.raises(InputError, match="suggests no depths"):
         chosen([ranged], "variance")
-
-
-def test_a_range_of_depths_that_cannot_be_searched_is_refused_before_any_work(tmp_path: Path) -> None:
     near = saved(tmp_path / "near", COUNTS, z_mm=[500], z_range_mm=(0.5, 800))
     with pytest.raises(InputError, match=r"near: z_range_mm: from .* choose a farther near end"):
         chosen([near], "depth")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tifffile
 from picture_folders import OPTICS, H, W, numbers, write
 from rendered_cards import Card, render
 
@@ -17,7 +16,6 @@ from pcii import (
     ViewOrder,
     check_grid,
     import_arrays,
-    import_counts,
     import_hci,
     import_images,
     import_lens_array,
@@ -87,16 +85,6 @@ def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
     assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
 
 
-def test_files_and_parameters_that_are_not_used_are_named(tmp_path: Path) -> None:
-    root = hci_folder(tmp_path / "scene")
-    text = (root / "parameters.cfg").read_text().replace("[meta]", "offset = 2\n[meta]\nscene = cotton")
-    (root / "parameters.cfg").write_text("\ufeff" + text)  # with a byte order mark
-    (root / "valid.png").write_bytes(b"")
-    told: list[str] = []
-    assert import_hci(root, tell=told.append).views.grid.rows == 3
-    assert told == ["not used: valid.png", "not used of parameters.cfg: offset, scene"]
-
-
 def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Path) -> None:
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
@@ -106,13 +94,10 @@ def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Pat
     assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
 
-@pytest.mark.parametrize("kept", [".npy", "array"])
-def test_arrays_come_in(tmp_path: Path, kept: str) -> None:
+def test_arrays_come_in(tmp_path: Path) -> None:
     light = np.random.default_rng(1).random((2, 3, H, W, 3))
-    source = tmp_path / f"a{kept}"
-    if kept == ".npy":
-        np.save(source, light)
-    views = import_arrays(light if kept == "array" else source, OPTICS)
+    np.save(tmp_path / "a.npy", light)
+    views = import_arrays(tmp_path / "a.npy", OPTICS)
     np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
     flat = light.reshape(6, H, W, 3)
     counted = import_arrays(flat, OPTICS, grid=(2, 3))
@@ -174,29 +159,6 @@ def test_a_mosaic_that_cutting_would_break_is_refused(tmp_path: Path) -> None:
     for wrong in (replace(even, pitch_px=(3, 4)), replace(even, inverted=True)):
         with pytest.raises(InputError, match="is a mosaic"):
             import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
-
-
-FRAMES = (np.random.default_rng(2).random((2, 3, 7, H, W)) < 0.2).astype(np.uint8)
-
-
-@pytest.mark.parametrize("kind", ["array", "npy", "bool", "tif", "ImageJ", "shaped", "appended", "float"])
-def test_frames_of_photons_are_added_up(tmp_path: Path, kind: str) -> None:
-    pattern, source = None, tmp_path / "frames.npy"
-    # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
-    options = {"tif": {}, "ImageJ": {"imagej": True, "truncate": True}, "shaped": {"truncate": True}}
-    if kind in ("tif", "ImageJ", "shaped", "appended"):
-        pattern, source = "{row}-{col}.tif", tmp_path
-        for k, l in np.ndindex(2, 3):
-            for part in np.split(FRAMES[k, l], 7) if kind == "appended" else [FRAMES[k, l]]:
-                more = options.get(kind, {"append": True})
-                tifffile.imwrite(tmp_path / f"{k}-{l}.tif", part, photometric="minisblack", **more)
-    else:
-        np.save(source, FRAMES.astype({"bool": bool, "float": np.float64}.get(kind, np.uint8)))
-    counts = import_counts(FRAMES if kind == "array" else source, OPTICS, pattern=pattern, cfa="GRBG")
-    assert counts.cfa == "GRBG"
-    np.testing.assert_array_equal(counts.dense, FRAMES.sum(axis=2))
-    assert counts.readout.frames == 7
-    assert (counts.frame is not None) == (kind == "bool")  # of one bit the frame of each count is kept
 
 
 def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:

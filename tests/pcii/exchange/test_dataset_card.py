@@ -9,12 +9,11 @@ from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, rewrite_manifest
 
 from pcii.base.errors import InputError
-from pcii.exchange.dataset_card import CITATION, CREATOR, LICENCE, Terms, write_card
+from pcii.exchange.dataset_card import LICENCE, Terms, write_card
 from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.verification import verify
 
-ROOT = Path(__file__).resolve().parents[3]
 MAX_LINES = 30
 TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "https://example.org/photons")
 
@@ -75,13 +74,3 @@ def test_names_with_markup_appear_as_plain_text_in_cards(tmp_path, name):
         page = MarkdownIt("gfm-like", {"html": True, "linkify": False}).render((root / CARD).read_text())
         assert {*re.findall(r"<(\w+)", page)} <= {"h1", "p", "code", "pre", "a", "blockquote"}
         assert all(link.startswith("https://") for link in re.findall('href="([^"]*)', page))
-
-
-def test_the_default_terms_are_those_of_the_project():
-    citation = (ROOT / "CITATION.cff").read_text()
-    assert f"license: {LICENCE}" in citation
-    assert f'name: "{CREATOR}"' in citation
-    title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
-    assert title is not None
-    assert CITATION.startswith(title[1])
-    assert (ROOT / "LICENSE").read_text().startswith("BSD 3-Clause License")

@@ -123,17 +123,10 @@ def test_cameras_have_their_own_maps_and_an_even_grid_has_none_of_its_centre(tmp
     assert not (hci.folder / "gt_depth_lowres.pfm").exists()
 
 
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({"pitch_mm": (9.0, 8.0)}, "pitch_mm"),
-        ({"shear_px": (1.0, 2.0)}, "shear_px"),
-        ({"shear_px": (-1.0, -1.0)}, "shear_px"),
-    ],
-)
-def test_what_the_layout_cannot_say_is_refused(tmp_path, changes, word):
-    data = write_planes(tmp_path / "planes", grid_of(2, 2, height=8, width=8, **changes))
-    assert word in one_sentence(lambda: pcii.export_dataset(data, "hci", tmp_path / "hci"), data)
+@pytest.mark.parametrize("shear_px", [(1.0, 2.0), (-1.0, -1.0)])
+def test_what_the_layout_cannot_say_is_refused(tmp_path, shear_px):
+    data = write_planes(tmp_path / "planes", grid_of(2, 2, height=8, width=8, shear_px=shear_px))
+    assert "shear_px" in one_sentence(lambda: pcii.export_dataset(data, "hci", tmp_path / "hci"), data)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["planes"]
 
 

@@ -121,9 +121,10 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     import OpenEXR
 
     planes = {name: np.ones((H, W), np.float32) for name in "RGBZ"}
-    with OpenEXR.File({"type": OpenEXR.scanlineimage}, planes) as file:
+    wide = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)  # Rec. 2020
+    with OpenEXR.File({"type": OpenEXR.scanlineimage, "chromaticities": wide}, planes) as file:
         file.write(str(tmp_path / "0_0.exr"))
-    with pytest.warns(UserWarning, match=r"not used: the channels Z in 0_0\.exr"):
+    with pytest.warns(UserWarning, match=r"not used: the channels Z and the chromaticities in 0_0\.exr"):
         import_images(tmp_path, PATTERN % "exr", OPTICS)
     (tmp_path / "0_0.exr").unlink()
     first, second = (Image.fromarray(numbers(0, l)) for l in range(2))

@@ -34,6 +34,7 @@ from pcii.store.dataset_layout import (
 from pcii.store.folders import list_files
 from pcii.store.verification import verify
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import Light
 
 # A dataset, read back
 
@@ -60,7 +61,7 @@ def test_what_a_dataset_does_not_have_is_none_or_refused_and_other_members_are_k
     assert dataset.truth is None
     assert dataset.views is None
     assert "no photon counts" in one_sentence(lambda: dataset.counts, root)
-    assert "no photons of budget 3" in one_sentence(lambda: dataset.at_budget(3), root)
+    assert "has no budget 3; there are none" in one_sentence(lambda: dataset.at_light(Light(3)), root)
     assert dataset.manifest["mine"] == {"a": [1]}
 
 

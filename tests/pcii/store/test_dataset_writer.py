@@ -54,7 +54,7 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     saved = save_dataset(tmp_path / "d", images, TRUTH, **depths, **texts)
     dataset = open_dataset(tmp_path / "d")
     assert dataset.manifest == saved.manifest
-    assert (dataset.grid, dataset.cfa, dataset.budgets) == (GRID, "GRBG", (10,))
+    assert (dataset.grid, dataset.cfa, dataset.light.photons) == (GRID, "GRBG", 10)
     assert dataset.counts.is_sparse == sparse
     assert same_counts(dataset.counts, COUNTED)
     assert dataset.views is not None

@@ -121,6 +121,7 @@ def test_photons_are_drawn_fairly_and_always_alike() -> None:
 def test_what_is_no_number_of_photons_is_refused(number: Any) -> None:
     with pytest.raises(InputError, match=r"^photons: expected a number above 0"):
         Light(number)
+    assert [Light.parse(t).stored for t in ("300", "exposure", "full-light")] == [300, None, "full-light"]
 
 
 def test_photons_of_views_are_poisson_numbers_of_their_own() -> None:

@@ -16,6 +16,7 @@ from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
 from pcii.types.bayer import colour_index
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import Light
 from simgen.dataset.prepared import capture_of, least_samples
 from simgen.photons import counting_plan as module
 from simgen.photons import photon_counting
@@ -450,7 +451,7 @@ def views_of(dataset: Dataset) -> np.ndarray:
 @pytest.mark.renders
 def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
     dataset = open_dataset(nested_dataset)
-    whole, middle, small = (views_of(dataset.at_budget(budget)) for budget in (400, 120, 30))
+    whole, middle, small = (views_of(dataset.at_light(Light(n))) for n in (400, 120, 30))
     assert (small <= middle).all()
     assert (middle <= whole).all()
     for views, budget in ((whole, 400), (middle, 120), (small, 30)):
@@ -458,9 +459,9 @@ def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
         expected = 6 * (budget + 0.01 * 64 * 60)
         assert abs(views.sum() - expected) < 5 * np.sqrt(expected)
     np.testing.assert_array_equal(whole, views_of(dataset))
-    reached = dataset.at_budget(30)  # from which another can be
-    assert (dataset.budget, reached.budget) == (None, 30)
-    np.testing.assert_array_equal(views_of(reached.at_budget(400)), whole)
+    reached = dataset.at_light(Light(30))  # from which another can be
+    assert (dataset.light, reached.light) == (Light(400), Light(30))
+    np.testing.assert_array_equal(views_of(reached.at_light(Light(400))), whole)
     manifest = json.loads((nested_dataset / MANIFEST).read_text())
     assert {"counts.zarr", "counts-30.zarr", "counts-120.zarr"} <= {
         name.split("/")[0] for name in manifest["files"]
@@ -471,7 +472,7 @@ def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
 @pytest.mark.renders
 def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None:
     whole = open_dataset(nested_dataset)
-    for dataset in (whole, whole.at_budget(120), whole.at_budget(30)):
+    for dataset in (whole, whole.at_light(Light(120)), whole.at_light(Light(30))):
         assert dataset.truth is not None
         photons = dataset.truth.photons
         assert photons is not None
@@ -481,9 +482,3 @@ def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None
         assert abs(dark.sum() - 230.4) < 4 * np.sqrt(230.4)
         assert np.isinf(photons.z_mm[dark]).all()
         assert set(np.unique(photons.object_id)) == {-1, 0, 1, 2}
-
-
-@pytest.mark.renders
-def test_a_budget_that_is_not_there_is_refused(nested_dataset: Path) -> None:
-    with pytest.raises(InputError, match=r"no photons of budget 31 here; there are 30, 120, 400"):
-        open_dataset(nested_dataset).at_budget(31)
