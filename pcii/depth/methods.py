@@ -78,9 +78,9 @@ def estimate_depth(
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
     estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
-    warn_of_saturation(data)
     if isinstance(estimate, PosteriorDepth):
         return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm))
+    warn_of_saturation(data)
     return estimate(data, z_range_mm)
 
 
@@ -95,6 +95,7 @@ def depth_posterior(
     `estimate_depth`.
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
+    warn_of_saturation(data)
     requested = NO_DEPTHS if z_mm is None else FocalPlanes.at_depths(data.grid, z_mm).z_mm
     return PosteriorDepth().posterior(data, z_range_mm, requested)
 
