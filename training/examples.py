@@ -18,11 +18,11 @@ from training.samples import Example, window
 
 HELD_OUT = 24
 """One dataset in this many is not trained on."""
-MAX_VALUES = {"cpu": 900_000, "cuda": 3_000_000}
-"""Largest number of blocks times planes of the part of an example that is used at once."""
-MIN_SIDE = 96
-BATCH = {"cpu": 3, "cuda": 8}
-"""Examples of a step."""
+MAX_VALUES = {"cpu": 3_000_000, "cuda": 24_000_000}
+"""Largest number of blocks times planes of a step."""
+SIDES = (96, 128, 192, 256)
+"""Blocks along the sides of the parts of films; those of a step are alike. Narrow things are learned from
+many small parts, wide ones and empty film from whole films."""
 WAITING_BATCHES = 8
 """Batches that are ready before their step."""
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
@@ -63,15 +63,18 @@ class Examples:
             while len(waiting) < WAITING_BATCHES:
                 kind = kinds[rng.integers(len(kinds))]
                 first = kind[rng.integers(len(kind))]
-                alike = self.of_planes[self.plane_count[first]]
-                files = [first, *(alike[at] for at in rng.integers(len(alike), size=BATCH[DEVICE] - 1))]
-                waiting.append(pool.submit(self.batch, files, np.random.default_rng(rng.integers(2**32))))
+                planes = self.plane_count[first]
+                side = SIDES[rng.integers(len(SIDES))]
+                count = max(1, MAX_VALUES[DEVICE] // (planes * side**2))
+                alike = self.of_planes[planes]
+                files = [first, *(alike[at] for at in rng.integers(len(alike), size=count - 1))]
+                task = self.batch, files, side, np.random.default_rng(rng.integers(2**32))
+                waiting.append(pool.submit(*task))
             yield _on_device(waiting.popleft().result())
 
-    def batch(self, files: list[Path], rng: np.random.Generator) -> Batch:
-        """Square parts of examples, as large as `MAX_VALUES` allows."""
+    def batch(self, files: list[Path], side: int, rng: np.random.Generator) -> Batch:
+        """Square parts of examples, `side` blocks wide or as wide as the narrowest of their films."""
         examples = [_read(file) for file in files]
-        side = max(MIN_SIDE, int(np.sqrt(MAX_VALUES[DEVICE] / self.plane_count[files[0]])))
         sides = (size for each in examples for size in each["evidence"].shape[1:])
         side = min(side, *sides) // MULTIPLE * MULTIPLE
         parts = [_part(example, side, rng) for example in examples]

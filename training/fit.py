@@ -21,8 +21,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pcii.depth.surface_network import WEIGHTS
-from training.examples import DEVICE, Batch, Examples
+from pcii.depth.surface_network import MIN_NEAR, WEIGHTS, near_requested
+from training.examples import DEVICE, SIDES, Batch, Examples
 from training.layers import SurfaceNetwork
 from training.requests import NOT_COUNTED
 
@@ -102,6 +102,8 @@ class Training:
                     self.minutes = minute
                     self._write(losses, examples)
                     losses.clear()
+                    examples = Examples(folder, pool)  # more may have been made in the meantime
+                    batches = examples.batches(rng, pool)
             self.minutes = minutes
             self._write(losses, examples)
 
@@ -118,7 +120,7 @@ class Training:
         self.optimizer.zero_grad(set_to_none=True)
         with HALF_PRECISION:
             depth, masks = self.network(*batch.inputs)
-        loss = depth_loss(depth.float(), batch.plane) + mask_loss(masks.float(), batch)
+        loss = depth_loss(depth.float(), batch.plane) + mask_loss(masks.float(), depth.float(), batch)
         loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
         self.optimizer.step()
@@ -162,10 +164,11 @@ def depth_loss(log_probability: Tensor, plane: Tensor) -> Tensor:
     return (torch.where(is_empty, -log_probability[:, -1], surface) * weight).sum() / weight.sum()
 
 
-def mask_log_probability(masks: Tensor, planes: Tensor) -> Tensor:
+def mask_log_probability(masks: Tensor, depth: Tensor, planes: Tensor) -> Tensor:
     """Log-probabilities (B, R + 1, h, w) of belonging to the requested `planes` (B, R), last to none.
 
-    `masks` (B, Z, h, w) are logits, between planes interpolated linearly.
+    `masks` (B, Z, h, w) are logits, between planes interpolated linearly, that are added to the logarithms of
+    the probabilities of depths near the planes, of the log-probabilities `depth` (B, Z + 1, h, w).
     """
     Z = masks.shape[1]
     is_missing = torch.isnan(planes)
@@ -174,16 +177,19 @@ def mask_log_probability(masks: Tensor, planes: Tensor) -> Tensor:
     upper_share = (place - lower)[:, :, None, None]
     film = torch.arange(len(masks), device=masks.device)[:, None]
     logits = (1 - upper_share) * masks[film, lower] + upper_share * masks[film, lower + 1]
-    logits = logits.masked_fill(is_missing[:, :, None, None], -1e4)
-    return torch.log_softmax(torch.cat([logits, torch.zeros_like(masks[:, :1])], dim=1), dim=1)
+    near = torch.stack([torch.from_numpy(near_requested(Z, each)) for each in planes.cpu().numpy()])
+    of_planes = torch.einsum("brz,bzhw->brhw", near.to(masks), depth[:, :-1].detach().exp())
+    of_none = (1 - of_planes.sum(dim=1, keepdim=True)).clamp(min=0)
+    logits = (logits + (of_planes + MIN_NEAR).log()).masked_fill(is_missing[:, :, None, None], -1e4)
+    return torch.log_softmax(torch.cat([logits, (of_none + MIN_NEAR).log()], dim=1), dim=1)
 
 
-def mask_loss(masks: Tensor, batch: Batch) -> Tensor:
+def mask_loss(masks: Tensor, depth: Tensor, batch: Batch) -> Tensor:
     """Mean cross-entropy in nats of masks, over blocks that count; 0 if there are none."""
     is_counted = batch.target != NOT_COUNTED
     if not is_counted.any():
         return 0 * masks.sum()
-    log_probability = mask_log_probability(masks, batch.planes)
+    log_probability = mask_log_probability(masks, depth, batch.planes)
     own = log_probability.gather(1, batch.target.clamp(min=0)[:, None])[:, 0]
     return -own[is_counted].mean()
 
@@ -193,7 +199,7 @@ def judge(network: SurfaceNetwork, examples: Examples) -> np.ndarray:
     wrong masks."""
     rows = []
     for file in examples.held_out:
-        batch = examples.batch([file], np.random.default_rng(0))
+        batch = examples.batch([file], max(SIDES), np.random.default_rng(0))
         batch = Batch([values.to(DEVICE) for values in batch.inputs], *(v.to(DEVICE) for v in batch[1:]))
         with torch.no_grad(), HALF_PRECISION:
             depth, masks = (part.float() for part in network(*batch.inputs))
@@ -201,12 +207,12 @@ def judge(network: SurfaceNetwork, examples: Examples) -> np.ndarray:
         off = ((depth[:, :-1].argmax(1) - batch.plane).abs() > 1)[is_surface].float().mean()
         wrong = torch.tensor(torch.nan)
         if is_counted.any():
-            label = mask_log_probability(masks, batch.planes).argmax(1)
+            label = mask_log_probability(masks, depth, batch.planes).argmax(1)
             wrong = (label != batch.target)[is_counted].float().mean()
         rows.append(
             [
                 depth_loss(depth, batch.plane).item(),
-                mask_loss(masks, batch).item() if is_counted.any() else np.nan,
+                mask_loss(masks, depth, batch).item() if is_counted.any() else np.nan,
                 off.item(),
                 wrong.item(),
             ]

@@ -21,9 +21,9 @@ import pcii
 from pcii.base.safe_files import write_bytes_safely
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.evidence.texture_evidence import evidence_of_texture
-from pcii.store.dataset import Dataset
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import total_disparity_px
+from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
 
 MIN_PHOTONS = 30.0
@@ -63,31 +63,35 @@ def missing_examples(collections: list[Path], count: int, out: Path) -> Iterator
 
 
 def write_example(folder: Path, file: Path) -> None:
-    """Write an example of a dataset as one file, at once; its name decides on all that is random."""
-    example = example_of(pcii.open_dataset(folder), np.random.default_rng(zlib.crc32(file.stem.encode())))
+    """Write an example of a dataset; its name decides on all that is random."""
+    dataset, rng = pcii.open_dataset(folder), np.random.default_rng(zlib.crc32(file.stem.encode()))
+    counts, truth, views = dataset.counts, dataset.truth, dataset.grid.view_count
+    assert truth is not None
+    brightest = max(counts.total / views, MIN_PHOTONS)
+    photons = views * np.exp(rng.uniform(np.log(MIN_PHOTONS), np.log(brightest)))
+    z_mm = np.asarray(dataset.analysis["z_mm"])
+    write(example_of(counts.subsample(photons, rng), truth, z_mm, rng), file)
+
+
+def write(example: Example, file: Path) -> None:
+    """Write an example as one file, at once."""
     content = io.BytesIO()
     np.savez(content, **example)  # type: ignore[arg-type]
     write_bytes_safely(file, content.getvalue())
 
 
-def example_of(dataset: Dataset, rng: np.random.Generator) -> Example:
+def example_of(counts: PhotonCounts, truth: Truth, z_mm: np.ndarray, rng: np.random.Generator) -> Example:
     """Inputs without a hint at half precision, and the truth.
 
     `plane` (H, W) float32 is the true plane as a fraction, NaN beyond them; `object_id` (H, W) int16;
     `objects` (N, 4) float32 are id, median plane, planes that the object reaches over, and share of the film;
-    `named_planes` (R,) float32 the planes that the scene names.
+    `named_planes` (R,) float32 the planes at the depths `z_mm` (R,) that the scene names.
     """
-    counts, truth, grid = dataset.counts, dataset.truth, dataset.grid
-    assert truth is not None
-    views = grid.view_count
-    brightest = max(counts.total / views, MIN_PHOTONS)
-    photons = views * np.exp(rng.uniform(np.log(MIN_PHOTONS), np.log(brightest)))
-    z_mm = np.asarray(dataset.analysis["z_mm"])
+    grid = counts.grid
     planes = FocalPlanes.between(grid, rng.uniform(*NEAR) * z_mm.min(), rng.uniform(*FAR) * z_mm.max(), 1.0)
     method = PosteriorDepth()
-    dimmed = counts.subsample(photons, rng)
-    evidence = evidence_of_texture(dimmed, planes, method.block_px, method.model)
-    inputs = method.network_inputs(evidence, planes, method.block_px)._asdict()
+    evidence = evidence_of_texture(counts, planes, method.block_px, method.model)
+    inputs = method.network_inputs(evidence, planes, method.block_px, np.zeros(0))._asdict()
     del inputs["hint"]
     example = {name: part.astype(np.float16) for name, part in inputs.items()}
     place = plane_of(planes, total_disparity_px(grid, np.where(truth.z_mm > 0, truth.z_mm, np.inf)))

@@ -8,13 +8,17 @@ from functools import partial
 from typing import TypeVar
 
 from pcii.base.progress import Report, silent
-from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_depth_method
+from pcii.depth.methods import DEFAULT_METHOD, depth_posterior, estimate_depth, find_depth_method
+from pcii.depth.posterior_depth import depth_map_of
 from pcii.metrics.scoring import score
 from pcii.removal.methods import DEFAULT_METHODS, find_method
+from pcii.removal.posterior_masks import masks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.types.focal_planes import FocalPlanes, check_depth_counts
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
 
 Result = TypeVar("Result")
@@ -72,15 +76,17 @@ def analyse(
     with ThreadPoolExecutor(2, "beside") as beside:
         light = beside.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
         sections = None if counts is None else timed("sections", partial(reconstruct, counts, planes))
-        estimate = partial(estimate_depth, data, z_range_mm, method=depth_method)
+        estimate = partial(_depth_of, data, z_range_mm, planes, depth_method)
         depth = beside.submit(timed, "depth", estimate)
         focus: list[Segmented] = []
         for name, remove in removals.items():
             assert counts is not None
             assert sections is not None
-            focus.append(timed(f"removal, {name}", partial(remove, counts, sections)))
+            posterior = depth.result()[1] if name == DEFAULT_METHOD else None
+            work = partial(remove, counts) if posterior is None else partial(masks_of, posterior)
+            focus.append(timed(f"removal, {name}", partial(work, sections)))
             report("removal", len(focus), len(removals))
-        full_light, depth_map = light.result(), depth.result()
+        full_light, (depth_map, _) = light.result(), depth.result()
     sections = full_light if sections is None else sections
     assert sections is not None
     options = {"grid": dataset.grid, "full_light": full_light, "dataset": dataset.name}
@@ -88,6 +94,18 @@ def analyse(
     return Outcome(
         dataset, full_light, sections, tuple(focus), depth_map, result, z_range_mm, seconds, depth_method
     )
+
+
+def _depth_of(
+    data: PhotonCounts | Views, z_range_mm: tuple[float, float], planes: FocalPlanes, method: str
+) -> tuple[DepthMap, DepthPosterior | None]:
+    """The depth map, and the posterior that it is read from if masks of the planes can be too."""
+    near_mm, far_mm = z_range_mm
+    has_planes = near_mm <= planes.z_mm.min() and planes.z_mm.max() <= far_mm
+    if method != DEFAULT_METHOD or not has_planes:
+        return estimate_depth(data, z_range_mm, method=method), None
+    posterior = depth_posterior(data, z_range_mm, z_mm=planes)
+    return depth_map_of(posterior), posterior
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes) -> Sections | None:

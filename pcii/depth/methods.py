@@ -17,10 +17,10 @@ from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
 from pcii.depth.depth_planes import check_range_mm
 from pcii.depth.focus_labels import focus_depth
-from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.types.estimates import DepthMap, DepthPosterior
-from pcii.types.focal_planes import check_data
+from pcii.types.focal_planes import FocalPlanes, check_data
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -45,14 +45,20 @@ BUILT_IN = FOR_COUNTS | FOR_VIEWS
 
 
 def estimate_depth(
-    data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, method: str | Method | None = None
+    data: PhotonCounts | Views,
+    z_range_mm: tuple[float, float],
+    *,
+    z_mm: object = None,
+    method: str | Method | None = None,
 ) -> DepthMap:
     """Depth per pixel, (H, W) float64 in mm within `z_range_mm`, NaN where the method abstains.
 
     `method` is one of `pcii.depth_methods()`, or a function that returns a `DepthMap` for the data and the
     range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
     by the smoothness of surfaces and by a network that has seen many (docs/theory.md); `depth_posterior` has
-    all of it. "focus", of photon counts, compares how well planes predict the photons, and abstains more.
+    all of it. It is told the depths `z_mm` (Z,) of planes in which objects are expected, if any are given;
+    other methods are not. "focus", of photon counts, compares how well planes predict the photons, and
+    abstains more.
     "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
     methods to compare with, which answer wherever there are samples.
 
@@ -72,18 +78,26 @@ def estimate_depth(
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
     estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
+    if isinstance(estimate, PosteriorDepth):
+        return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm))
     warn_of_saturation(data)
     return estimate(data, z_range_mm)
 
 
-def depth_posterior(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
+def depth_posterior(
+    data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, z_mm: object = None
+) -> DepthPosterior:
     """Probability of each depth in `z_range_mm`, and of no surface there, for blocks of 2 x 2 pixels or more.
 
     It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
-    value everywhere: where no photon is, that of scenes on average. Raises `InputError` as `estimate_depth`.
+    value everywhere: where no photon is, that of scenes on average. Of the depths `z_mm` (Z,), if any are
+    given, it says what is in focus there, as the method "posterior" of `segment` does. Raises `InputError` as
+    `estimate_depth`.
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
-    return PosteriorDepth().posterior(data, z_range_mm)
+    warn_of_saturation(data)
+    requested = NO_DEPTHS if z_mm is None else FocalPlanes.at_depths(data.grid, z_mm).z_mm
+    return PosteriorDepth().posterior(data, z_range_mm, requested)
 
 
 def _checked_range_mm(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> tuple[float, float]:

@@ -1,19 +1,17 @@
-"""Depth from its posterior probability: evidence of texture, smooth surfaces, and a network that corrects it.
+"""Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
 
-The network has seen photon counts alone; of radiance the posterior is that of smooth surfaces, in which there
-is always one. Blocks without evidence follow their neighbours, and where there is none at all the posterior
-still has a largest value. So whether a surface is seen is decided apart: there are photons, and two halves of
-the cameras show the same structure (`pcii.evidence.half_agreement`).
+Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
+largest value. So whether a surface is seen is decided apart: there are photons, and two halves of the cameras
+show the same structure (`pcii.evidence.half_agreement`).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
-from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
-from pcii.depth.surface_network import MULTIPLE, network_posterior
+from pcii.depth.smooth_surface import SurfacePrior
+from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
@@ -22,12 +20,13 @@ from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
+NO_DEPTHS = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -53,84 +52,59 @@ class PosteriorDepth:
     """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
     most_empty: float = 0.9
     """No surface is seen where the probability of none is higher."""
-    interpolation_blocks: float = 2.0
-    """Standard deviation of the window whose evidence places the depth of radiance between two planes."""
 
-    def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
+    def __call__(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
+    ) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
-        data = _without_faults(data)
-        posterior, evidence = self._posterior(data, z_range_mm)
-        plane, confidence, total_px = posterior.most_probable()
-        if isinstance(data, Views):
-            z_mm = self._between_planes_mm(evidence.nats, posterior.planes, plane)
-        else:
-            z_mm = depth_of_total_disparity_mm(data.grid, total_px)
-        detected = self._detected(data, posterior, evidence.photons, plane)
-        depth = np.where(detected, z_mm, np.nan)
-        maps = depth, np.where(detected, confidence, 0.0)
-        return DepthMap(*(on_pixels(part, posterior.block_px, data.grid.shape_HW) for part in maps))
+        return depth_map_of(self.posterior(data, z_range_mm, z_mm))
 
-    def posterior_with_detection(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
-    ) -> tuple[DepthPosterior, np.ndarray]:
-        """The posterior of planes through the range, and the blocks (h, w) bool where a surface is detected.
-
-        They are those where the depth map has an answer.
-        """
-        data = _without_faults(data)
-        posterior, evidence = self._posterior(data, z_range_mm)
-        return posterior, self._detected(data, posterior, evidence.photons, posterior.most_probable()[0])
-
-    def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
-        """The posterior of planes through the range."""
-        return self._posterior(_without_faults(data), z_range_mm)[0]
-
-    def _posterior(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
-    ) -> tuple[DepthPosterior, TextureEvidence]:
-        """The posterior, and the evidence that it is made of."""
+    def posterior(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
+    ) -> DepthPosterior:
+        """The posterior of planes through the range, and masks of the planes at `z_mm` (R,)."""
+        if isinstance(data, PhotonCounts):
+            data = without_hot_pixels(data)
         planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
         block_px = self.block_px
         while len(planes) * data.grid.height * data.grid.width / block_px**2 > MOST_VALUES:
             block_px *= 2
         evidence = evidence_of_texture(data, planes, block_px, self.model)
+        requested_px = total_disparity_px(data.grid, z_mm)
+        inputs = self.network_inputs(evidence, planes, block_px, requested_px)
+        # Where there are no photons there is no surface, and the depth map has no answer.
+        probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
+        in_focus = np.zeros((z_mm.size, *nothing.shape), np.float32)
+        part = self._part_with_photons(evidence.photons, block_px, nothing.shape)
+        if part is not None:
+            requested_planes = np.interp(requested_px, planes.total_disparity_px, np.arange(len(planes)))
+            outputs = run_network(inputs.part(*part), requested_planes)
+            probability[:, *part], nothing[part], in_focus[:, *part] = outputs
         h, w = evidence.nats.shape[1:]
-        if isinstance(data, Views):
-            probability = surface_posterior(evidence.nats, self.prior).transpose(2, 0, 1)
-            nothing = np.zeros((h, w), np.float32)
-        else:
-            inputs = self.network_inputs(evidence, planes, block_px)
-            # Where there are no photons there is no surface, and the depth map has no answer.
-            probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
-            part = self._part_with_photons(evidence.photons, block_px, nothing.shape)
-            if part is not None:
-                probability[:, *part], nothing[part] = network_posterior(inputs.part(*part))
-        posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
-        return posterior, evidence
+        whole = np.s_[..., :h, :w]
+        maps = probability[whole], nothing[whole], block_px, in_focus[whole]
+        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros((h, w), bool))
+        return replace(posterior, is_detected=self._detected(data, posterior, evidence.photons))
 
     def _detected(
-        self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray, plane: np.ndarray
+        self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
     ) -> np.ndarray:
-        """Where a surface is detected (h, w) bool, `plane` (h, w) the most probable one."""
+        """Where a surface is detected (h, w) bool."""
+        plane, _, _ = posterior.most_probable()
         detected = self._has_photons(photons, plane, posterior.block_px)
         detected &= posterior.no_surface <= self.most_empty
         agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, detected)
         surrounded = self._directions(agree & detected, plane, posterior) >= self.least_directions
         return detected & (agree | surrounded & (posterior.no_surface < 0.5))
 
-    def _between_planes_mm(self, nats: np.ndarray, planes: FocalPlanes, plane: np.ndarray) -> np.ndarray:
-        """Depth (h, w) at the top of the evidence (Z, h, w) around a `plane` (h, w).
+    def network_inputs(
+        self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
+    ) -> NetworkInputs:
+        """What the network is given for the evidence of blocks of photon counts.
 
-        In full light all probability is at one plane, so that its mean is that plane; the evidence is not.
+        `requested_px` (R,) are the total disparities of planes that are asked about.
         """
-        from scipy.ndimage import gaussian_filter
-
-        smooth = gaussian_filter(nats, self.interpolation_blocks, axes=(1, 2))
-        return peak_depth_mm(planes, plane, neighbours_of(smooth, plane))
-
-    def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
-        """What the network is given for the evidence of blocks of photon counts."""
-        hint = hint_of(planes.total_disparity_px, np.zeros(0))  # no plane is requested
+        hint = hint_of(planes.total_disparity_px, requested_px)
         return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
@@ -179,8 +153,13 @@ class PosteriorDepth:
         return gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
 
 
-def _without_faults(data: PhotonCounts | Views) -> PhotonCounts | Views:
-    return without_hot_pixels(data) if isinstance(data, PhotonCounts) else data
+def depth_map_of(posterior: DepthPosterior) -> DepthMap:
+    """Depth and confidence of pixels, where the posterior has an answer."""
+    grid = posterior.planes.grid
+    _, confidence, total_px = posterior.most_probable()
+    depth_mm = np.where(posterior.is_detected, depth_of_total_disparity_mm(grid, total_px), np.nan)
+    maps = depth_mm, np.where(posterior.is_detected, confidence, 0.0)
+    return DepthMap(*(on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps))
 
 
 def _moved(by: int, size: int) -> tuple[slice, slice]:

@@ -7,7 +7,7 @@ network's weights are in `weights`; `training` has the commands that make them. 
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,28 @@ BAND_VALUES = 1 << 20
 """Blocks times planes whose last step is done at once, which takes 0.2 GB."""
 
 
-def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
-    """Probabilities (Z, h, w) of the planes and (h, w) of no surface, float32, for blocks of the inputs."""
+NEAR_PX = 10.0
+"""What is farther from a requested plane in total disparity has a blur half-extent above 5 px, and is
+defocused as far as its depth says."""
+MIN_NEAR = 1e-3
+"""Added to the probabilities of depths near a plane: of what the depth excludes, shapes may still tell."""
+
+
+class NetworkOutputs(NamedTuple):
+    """Probabilities, float32, of blocks: of each plane (Z, h, w), of no surface (h, w), and of being in focus
+    at each requested plane (R, h, w)."""
+
+    probability: np.ndarray
+    no_surface: np.ndarray
+    in_focus: np.ndarray
+
+
+def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkOutputs:
+    """What the network says of the blocks of the inputs.
+
+    `requested_planes` (R,) are numbers of planes, in fractions, that a mask is asked for; `inputs.hint` says
+    the same to the network.
+    """
     import onnxruntime
     from scipy.special import expit, logsumexp, softmax
 
@@ -43,6 +63,11 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     *of_cells, cell_nothing = map(np.asarray, trunk.run(None, given, options))
     nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
+    in_focus = np.empty((requested_planes.size, h, w), np.float32)
+    lower = np.clip(requested_planes.astype(int), 0, max(Z - 2, 0))
+    upper = np.minimum(lower + 1, Z - 1)
+    near = near_requested(Z, requested_planes)
+    upper_share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
     for top in range(0, h, rows):
         end = min(top + rows, h)
@@ -56,11 +81,28 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
             given["brightness"][blocks],
         )
         names = [argument.name for argument in head.get_inputs()]
-        (logit,) = head.run(["logit"], dict(zip(names, parts, strict=True)), options)
-        own = np.asarray(logit)[0, :, top - first : end - first]
+        logit, mask = head.run(["logit", "mask"], dict(zip(names, parts, strict=True)), options)
+        own, masks = (np.asarray(part)[0, :, top - first : end - first] for part in (logit, mask))
         none[top:end] = expit(nothing[top:end] - logsumexp(own, axis=0))
         probability[:, top:end] = softmax(own / np.float32(TEMPERATURE), axis=0) * (1 - none[top:end])
-    return probability, none
+        at_planes = (1 - upper_share) * masks[lower] + upper_share * masks[upper]
+        of_planes = np.tensordot(near, softmax(own, axis=0) * (1 - none[top:end]), axes=1)
+        of_none = np.maximum(1 - of_planes.sum(axis=0, keepdims=True), 0)
+        logits = np.concatenate([at_planes + np.log(of_planes + MIN_NEAR), np.log(of_none + MIN_NEAR)])
+        in_focus[:, top:end] = softmax(logits, axis=0)[:-1]
+    return NetworkOutputs(probability, none, in_focus)
+
+
+def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
+    """Which of Z planes, 1 px of total disparity apart, are near each requested one: (R, Z) float32, 0 or 1.
+
+    A plane is near the closest requested one, if within `NEAR_PX`; NaN requests nothing.
+    """
+    if requested_planes.size == 0:
+        return np.zeros((0, Z), np.float32)
+    distance = np.abs(np.arange(Z) - np.nan_to_num(requested_planes, nan=np.inf)[:, None])
+    is_closest = distance.argmin(axis=0) == np.arange(requested_planes.size)[:, None]
+    return (is_closest & (distance <= NEAR_PX)).astype(np.float32)
 
 
 @cache

@@ -3,7 +3,7 @@
 from pcii.base.extensions import MethodRegistry
 from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
-from pcii.removal.posterior_masks import PosteriorMasks
+from pcii.removal.posterior_masks import remove_by_network
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.sections.reconstruction import reconstruct
@@ -64,7 +64,7 @@ def find_method(method: str | plugins.Method) -> plugins.Method:
 METHODS: dict[str, plugins.Method | str] = {
     "three-step": ThreeStep(),
     "likelihood": remove_by_likelihood,
-    "posterior": PosteriorMasks(),
+    "posterior": remove_by_network,
     "brightness": "pcii.baselines.simple_removals:brightness",
     "variance": "pcii.baselines.simple_removals:variance",
     "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",

@@ -86,23 +86,31 @@ class DepthPosterior(ShortForm):
 
     `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
     there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
-    total disparity. h x w are enough blocks for all pixels. Raises `InputError` for other shapes.
+    total disparity. h x w are enough blocks for all pixels. `in_focus` (R, h, w) float32 is the probability
+    that the surface belongs to an object in focus at each of R requested planes. `is_detected` (h, w) bool is
+    where depth maps and masks have an answer. Raises `InputError` for other shapes.
     """
 
     planes: FocalPlanes
     probability: np.ndarray
     no_surface: np.ndarray
     block_px: int
+    in_focus: np.ndarray
+    is_detected: np.ndarray
 
     def __post_init__(self) -> None:
         h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
-        if self.probability.shape != (len(self.planes), h, w) or self.no_surface.shape != (h, w):
-            raise InputError(
-                f"probability, no_surface: expected ({len(self.planes)}, {h}, {w}) and ({h}, {w}), got "
-                f"{self.probability.shape} and {self.no_surface.shape}"
-            )
-        object.__setattr__(self, "probability", read_only(self.probability))
-        object.__setattr__(self, "no_surface", read_only(self.no_surface))
+        shapes = {
+            "probability": (len(self.planes), h, w),
+            "no_surface": (h, w),
+            "in_focus": (len(self.in_focus), h, w),
+            "is_detected": (h, w),
+        }
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if values.shape != shape:
+                raise InputError(f"{name}: expected {shape}, got {values.shape}")
+            object.__setattr__(self, name, read_only(values))
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}

@@ -10,7 +10,7 @@ from pcii.depth.methods import estimate_depth
 from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import surface_posterior
-from pcii.depth.surface_network import network_posterior
+from pcii.depth.surface_network import NetworkOutputs, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
@@ -93,7 +93,7 @@ def test_depths_that_look_alike_share_the_probability():
             surface = surface_posterior(evidence.nats, method.prior).transpose(2, 0, 1)
             nowhere = np.zeros(surface.shape[1:], np.float32)
             for posterior in (
-                DepthPosterior(planes, surface, nowhere, method.block_px),
+                DepthPosterior(planes, surface, nowhere, method.block_px, surface[:0], nowhere > 0),
                 method.posterior(counts, z_range_mm),
             ):
                 probabilities.append(np.median(posterior.most_probable()[1]))
@@ -218,11 +218,11 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
     place = events.k, events.l, events.i + 64, events.j + 64, events.n
     counts, sizes = PhotonCounts.from_events(*place, grid, cfa="GRBG"), list[tuple[int, ...]]()
 
-    def noting(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
+    def noting(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkOutputs:
         sizes.append(inputs.evidence.shape[1:])
-        return network_posterior(inputs)
+        return run_network(inputs, requested_planes)
 
-    monkeypatch.setattr("pcii.depth.posterior_depth.network_posterior", noting)
+    monkeypatch.setattr("pcii.depth.posterior_depth.run_network", noting)
     whole, part, edges = (PosteriorDepth(margin_blocks=n)(counts, range_mm) for n in (1000, 64, 0))
     assert sizes == [(320, 352), (224, 224), (128, 128)]  # blocks of 2 px
 
@@ -236,9 +236,11 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
 
 
 def test_without_photons_the_network_is_not_run(monkeypatch) -> None:
-    monkeypatch.setattr("pcii.depth.posterior_depth.network_posterior", None)
+    monkeypatch.setattr("pcii.depth.posterior_depth.run_network", None)
     grid = unit_grid(2, 2, 64, 64)
     dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, int), grid)
-    posterior = PosteriorDepth().posterior(dark, RANGE_MM)
+    posterior = PosteriorDepth().posterior(dark, RANGE_MM, np.array([0.5]))
     assert (posterior.no_surface == 1).all()
     assert not posterior.probability.any()
+    assert not posterior.in_focus.any()
+    assert not posterior.is_detected.any()

@@ -9,13 +9,14 @@ from pcii.depth import surface_network
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import SurfacePrior
-from pcii.depth.surface_network import network_posterior
+from pcii.depth.surface_network import near_requested, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.types.estimates import DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 
 METHOD = PosteriorDepth()
+PLANES = np.array([1.0, 3.4])
 
 
 def random_inputs(Z: int = 5, h: int = 64, w: int = 96, seed: int = 0) -> NetworkInputs:
@@ -36,16 +37,26 @@ def random_inputs(Z: int = 5, h: int = 64, w: int = 96, seed: int = 0) -> Networ
 
 
 def test_it_gives_a_distribution_for_each_block() -> None:
-    probability, nothing = network_posterior(random_inputs())
+    probability, nothing, in_focus = run_network(random_inputs(), PLANES)
     assert probability.shape == (5, 64, 96)
-    assert probability.min() >= 0
+    assert in_focus.shape == (2, 64, 96)
+    assert min(probability.min(), in_focus.min()) >= 0
     np.testing.assert_allclose(probability.sum(axis=0) + nothing, 1, rtol=1e-5)
+    assert in_focus.sum(axis=0).max() <= 1 + 1e-6
+
+
+def test_each_depth_is_near_the_closest_requested_plane_within_reach() -> None:
+    near = near_requested(40, np.array([30.0, 4.4, np.nan]))
+    assert near[:, 15:20].sum() == 0
+    assert near[1].nonzero()[0].tolist() == list(range(15))
+    assert near[0].nonzero()[0].tolist() == list(range(20, 40))
+    assert near_requested(7, np.zeros(0)).shape == (0, 7)
 
 
 def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = network_posterior(random_inputs())
+    whole = run_network(random_inputs(), PLANES)
     monkeypatch.setattr(surface_network, "BAND_VALUES", 5 * 96 * 7)
-    for own, expected in zip(network_posterior(random_inputs()), whole, strict=True):
+    for own, expected in zip(run_network(random_inputs(), PLANES), whole, strict=True):
         # The runtime may order sums otherwise for another size.
         np.testing.assert_allclose(own, expected, rtol=1e-4, atol=1e-6)
 
@@ -56,7 +67,7 @@ def test_the_number_of_threads_does_not_show() -> None:
     try:
         for count in (1, 2):
             use_threads(count)
-            results.append(network_posterior(random_inputs())[0])
+            results.append(run_network(random_inputs(), PLANES)[0])
     finally:
         use_threads(before)
     assert np.array_equal(*results)
@@ -67,7 +78,7 @@ def test_inputs_tell_how_much_light_there_is(two_squares) -> None:
 
     def of(data: PhotonCounts) -> NetworkInputs:
         evidence = evidence_of_texture(data, planes, METHOD.block_px, METHOD.model)
-        return METHOD.network_inputs(evidence, planes, METHOD.block_px)
+        return METHOD.network_inputs(evidence, planes, METHOD.block_px, np.zeros(0))
 
     few = two_squares.counts.subsample(two_squares.counts.total / 4, np.random.default_rng(0))
     assert float(of(two_squares.counts).light[0] - of(few).light[0]) == pytest.approx(np.log10(4), abs=0.05)
@@ -106,7 +117,8 @@ def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() ->
     probability = np.zeros((4, 1, 2), np.float32)
     probability[:, 0, 0] = [0.0, 0.25, 0.5, 0.0]
     probability[:, 0, 1] = [0.4, 0.1, 0.0, 0.0]
-    posterior = DepthPosterior(planes, probability, 1 - probability.sum(axis=0), block_px=2)
+    nothing = 1 - probability.sum(axis=0)
+    posterior = DepthPosterior(planes, probability, nothing, 2, probability[:0], nothing < 1)
     plane, confidence, total_px = posterior.most_probable()
     assert plane.tolist() in ([[1, 0]], [[2, 0]])
     np.testing.assert_allclose(confidence, [[0.75, 0.5]])
@@ -115,5 +127,6 @@ def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() ->
 
 def test_a_posterior_that_does_not_cover_the_film_is_refused() -> None:
     planes = FocalPlanes.at_total_disparity(unit_grid(1, 3, 4, 5), [4.0, 5.0])
-    with pytest.raises(ValueError, match=r"probability, no_surface: expected \(2, 2, 3\) and \(2, 3\), got"):
-        DepthPosterior(planes, np.zeros((2, 2, 2), np.float32), np.zeros((2, 2), np.float32), block_px=2)
+    nowhere = np.zeros((2, 2), np.float32)
+    with pytest.raises(ValueError, match=r"probability: expected \(2, 2, 3\), got \(2, 2, 2\)"):
+        DepthPosterior(planes, nowhere[None].repeat(2, 0), nowhere, 2, nowhere[None][:0], nowhere > 0)
