@@ -10,14 +10,13 @@ from functools import partial
 from itertools import accumulate
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import simgen
 from simgen.drawn.composition import box_of, card, colour, cylinder_of, placed, sphere
 from simgen.drawn.kinds import glossy, plain
-from training.scenes import any_material, log_uniform
+from training.mesh_shapes import FOLDER, blob, head, mesh_of, spindle, tube
+from training.scenes import Table, any_material, log_uniform
 
-Table = dict[str, Any]
 Material = Callable[[Random], Table]
 
 TOTAL_PX_MM = 9 * 5 * 50 / 0.0704
@@ -94,7 +93,7 @@ def pickets(random: Random) -> simgen.Scene:
 def plain_pair(random: Random) -> simgen.Scene:
     """Two or three large things of one colour each before the dark, or before what is plain as well."""
     planes = plane_depths(random, random.choice([2, 2, 3]))
-    apart, objects = log_uniform(random, 40, 110), []
+    apart, objects = log_uniform(random, 50, 130), []
     for number, z in enumerate(random.sample(planes, len(planes))):
         shape, behind, _ = any_shape(random, log_uniform(random, 38, 95))
         x = apart * (number - (len(planes) - 1) / 2) + random.uniform(-15, 15)
@@ -147,6 +146,23 @@ def glazed(random: Random) -> simgen.Scene:
         material = one_of(random, glossy, glossy, _glass, any_material)(random)
         objects.append(placed(f"glazed-{number}", place, any_turn(random), shape, material))
     return composed(random, "Glass and gloss", objects, planes)
+
+
+def meshes(random: Random) -> simgen.Scene:
+    """Two to six curved shapes: blobs, heads, rings, knots, springs, cones, capsules and vases."""
+    planes = plane_depths(random, random.choice([2, 2, 3, 4]))
+    objects = []
+    for number in range(random.randint(2, 6)):
+        make, z = random.choice([blob, head, tube, tube, spindle]), planes[number % len(planes)]
+        size = log_uniform(random, 18, 85)
+        place = random.uniform(-100, 100), random.uniform(-80, 80), z + (0.0 if make is tube else 0.6 * size)
+        turn = 40.0 if make is head else random.choice([25.0, 180.0])
+        rotation = random.uniform(-turn, turn) / 2, random.uniform(-turn, turn), random.uniform(-turn, turn)
+        material = one_of(random, plain, any_material, any_material, glossy)(random)
+        name, shape = f"{make.__name__}-{number}", mesh_of(make(random), size)
+        objects.append(placed(name, place, rotation, shape, material))
+    objects += anything_behind(random, planes[-1])
+    return composed(random, "Curved things", objects, planes, FOLDER)
 
 
 def empty_wall(random: Random) -> simgen.Scene:
@@ -210,7 +226,7 @@ def large_material(random: Random) -> Table:
     if random.random() < 0.35:
         return plain(random)
     if random.random() < 0.6:
-        return any_material(random, 2048)
+        return any_material(random, 1024)
     shades = {
         "type": "noise",
         "exponent": round(random.uniform(1.6, 2.4), 2),
