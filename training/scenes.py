@@ -30,19 +30,19 @@ def assorted(random: Random) -> simgen.Scene:
             turned = tuple(random.uniform(-angle, angle) for angle in turn)
             objects.append(placed(f"{kind}-{number}", place, turned, shape(), any_material(random)))
 
-    add("ball", random.randint(0, 3), lambda: sphere(_log_uniform(random, 10, 65)), 30, (180, 180, 180))
+    add("ball", random.randint(0, 3), lambda: sphere(log_uniform(random, 10, 65)), 30, (180, 180, 180))
     sides = (15, 120), (15, 120), (10, 60)
     add(
         "box",
         random.randint(0, 3),
-        lambda: box_of(*(_log_uniform(random, *ends) for ends in sides)),
+        lambda: box_of(*(log_uniform(random, *ends) for ends in sides)),
         25,
         (40, 50, 60),
     )
     add(
         "tin",
         random.randint(0, 2),
-        lambda: cylinder_of(_log_uniform(random, 6, 40), _log_uniform(random, 30, 180)),
+        lambda: cylinder_of(log_uniform(random, 6, 40), log_uniform(random, 30, 180)),
         20,
         (60, 60, 90),
     )
@@ -50,7 +50,7 @@ def assorted(random: Random) -> simgen.Scene:
     add(
         "card",
         cards,
-        lambda: card(_log_uniform(random, 15, 160), _log_uniform(random, 10, 110)),
+        lambda: card(log_uniform(random, 15, 160), log_uniform(random, 10, 110)),
         0,
         (35, 35, 180),
     )
@@ -59,7 +59,7 @@ def assorted(random: Random) -> simgen.Scene:
         turned = random.choice([turned, (random.uniform(40, 65), random.uniform(-10, 10), 0.0)])
         place = 0.0, 60.0, random.uniform(690, 780)
         objects.append(placed("ground", place, turned, card(900, 900), any_material(random, 2048)))
-    luminances = _log_uniform(random, 500, 4000), _log_uniform(random, 40, 400)
+    luminances = log_uniform(random, 500, 4000), log_uniform(random, 40, 400)
     return _lit(random, "Assorted things", objects, [near, middle, far], luminances)
 
 
@@ -68,7 +68,7 @@ def screens(random: Random) -> simgen.Scene:
     sometimes a wall: from every camera another part of what is behind is hidden."""
     near = random.randint(450, 510)
     far = near + random.randint(60, 150)
-    width, tilt, material = _log_uniform(random, 3, 16), random.uniform(-90, 90), any_material(random, 256)
+    width, tilt, material = log_uniform(random, 3, 16), random.uniform(-90, 90), any_material(random, 256)
     objects = []
     for number in range(random.choice([3, 6, 10])):
         place = random.uniform(-110, 110), random.uniform(-30, 30), near + random.gauss(0, 2)
@@ -88,7 +88,7 @@ def screens(random: Random) -> simgen.Scene:
     if random.random() < 1 / 3:
         place = 0.0, 0.0, random.uniform(690, 780)
         objects.append(placed("wall", place, (0.0, 0.0, 0.0), card(900, 900), any_material(random, 2048)))
-    return _lit(random, "Things behind bars", objects, [near, far], (2000.0, _log_uniform(random, 60, 300)))
+    return _lit(random, "Things behind bars", objects, [near, far], (2000.0, log_uniform(random, 60, 300)))
 
 
 def any_material(random: Random, pixels: int = 512) -> Table:
@@ -97,7 +97,7 @@ def any_material(random: Random, pixels: int = 512) -> Table:
     if random.random() < 0.25:
         return {"reflectance": colour(random, 0.1, 0.9)}
     if random.random() < 0.08:
-        metal, roughness = random.choice(["Ag", "Au", "Cu"]), round(_log_uniform(random, 0.08, 0.5), 2)
+        metal, roughness = random.choice(["Ag", "Au", "Cu"]), round(log_uniform(random, 0.08, 0.5), 2)
         return {"finish": {"type": "metal", "name": metal, "roughness": roughness}}
     texture = random.choice(
         [
@@ -129,7 +129,8 @@ def any_material(random: Random, pixels: int = 512) -> Table:
     return {"texture": texture | {"pixels": pixels}}
 
 
-def _log_uniform(random: Random, low: float, high: float) -> float:
+def log_uniform(random: Random, low: float, high: float) -> float:
+    """A number between the two, even in its logarithm."""
     return low * (high / low) ** random.random()
 
 
