@@ -64,6 +64,13 @@ SectionDepths = Annotated[
         "suggests."
     ),
 ]
+ExpectedDepths = Annotated[
+    Depths,
+    Parameter(
+        help="Depth in mm of a plane in which objects are expected, or start:stop:step; repeat for more. "
+        "Default: those that the dataset suggests. Methods other than posterior are not told."
+    ),
+]
 DepthRange = Annotated[
     tuple[float, float] | None,
     Parameter(

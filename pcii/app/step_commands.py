@@ -9,6 +9,7 @@ from pcii.app.command_options import (
     Budget,
     DatasetFolder,
     DepthRange,
+    ExpectedDepths,
     ResultsOut,
     SectionDepths,
     dataset_at,
@@ -27,9 +28,8 @@ from pcii.sections.reconstruction import reconstruct as reconstruct_sections
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
 from pcii.store.software import differences, own_software
-from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.estimates import DepthMap
-from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_limit import Light
 
 LOW_ANSWERED_SHARE = 0.1
@@ -117,6 +117,7 @@ def depth(
     *,
     out: ResultsOut,
     z_range_mm: DepthRange = None,
+    z_mm: ExpectedDepths = (),
     method: str = DEFAULT_METHOD,
     budget: Budget = None,
 ) -> None:
@@ -133,9 +134,10 @@ def depth(
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
     data = dataset_at(dataset, budget)
-    near, far = z_range_mm or depth_range_of(data)
+    near, far = z_range_mm or depth_range_of(data, z_mm)
+    planes = planes_of(data, z_mm) if has_depths(data, z_mm) else None
     with results.writing(out, data) as folder:
-        depth_map = estimate_depth(data.counts_or_views, (near, far), method=method)
+        depth_map = estimate_depth(data.counts_or_views, (near, far), z_mm=planes, method=method)
         results.save_depth(folder, depth_map)
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
@@ -194,8 +196,8 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")
-    z_mm = data.analysis.get("z_mm")
-    planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
+    planes = planes_of(data) if has_depths(data) else None
+    planes = focus[0].sections.planes if focus else planes
     with results.writing(out, data) as folder:
         full_light = full_light_sections(data, planes) if data.truth and planes else None
         result = scoring.score(

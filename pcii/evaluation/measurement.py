@@ -19,7 +19,7 @@ from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.store.software import differences, machine
-from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -100,8 +100,9 @@ class EvaluationJob:
 
         def work() -> Any:
             if estimator is not None:
-                z_range_mm = depth_range_of(data, task.z_mm)
-                return estimate_depth(seen, z_range_mm, method=task.method.function or estimator)
+                z_range_mm, method = depth_range_of(data, task.z_mm), task.method.function or estimator
+                planes = planes_of(data, task.z_mm) if has_depths(data, task.z_mm) else None
+                return estimate_depth(seen, z_range_mm, z_mm=planes, method=method)
             assert isinstance(seen, PhotonCounts)
             method = task.method.function or task.method.name
             return segment(seen, planes_of(data, task.z_mm), method=method)
@@ -121,7 +122,7 @@ class EvaluationJob:
         """`bound_px`, the median of the objects, if there is radiance from which their textures are known."""
         lit, truth, z_mm = self.full_light_of(task), data.truth, task.z_mm
         views = lit.views
-        if not isinstance(seen, PhotonCounts) or views is None or not (z_mm or data.analysis.get("z_mm")):
+        if not isinstance(seen, PhotonCounts) or views is None or not has_depths(data, z_mm):
             return {}
         assert truth is not None
         planes, identity = planes_of(data, z_mm), identity_of(lit.manifest)

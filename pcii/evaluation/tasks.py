@@ -9,7 +9,7 @@ from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for
 from pcii.evaluation.rows import Key, identity_of
 from pcii.store.dataset import Dataset
 from pcii.store.dataset_layout import TRUTH
-from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.photon_limit import FULL_LIGHT, Light
 
 
@@ -70,7 +70,7 @@ def tasks_of(
 
 def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[NamedMethod]:
     # Removal is of sections at depths that are named.
-    has_planes = bool(z_mm or dataset.analysis.get("z_mm"))
+    has_planes = has_depths(dataset, z_mm)
     names = methods_for(full_light=light == FULL_LIGHT)
     return [NamedMethod(name) for name in names if has_planes or estimator_of(name)]
 

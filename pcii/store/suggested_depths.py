@@ -11,16 +11,20 @@ from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import disparity_px
 
 
+def has_depths(dataset: Dataset, z_mm: Sequence[float] | None = None) -> bool:
+    """Whether depths are given, or suggested by the recipe."""
+    return bool(z_mm or dataset.analysis.get("z_mm"))
+
+
 def planes_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> FocalPlanes:
     """Focal planes at the depths `z_mm`, else at those that the recipe suggests.
 
     Raises `InputError` if there are none, or if no views overlap at one.
     """
-    depths = z_mm or dataset.analysis.get("z_mm")
-    if not depths:
+    if not has_depths(dataset, z_mm):
         advice = "name depths with --z-mm, or a range with --z-range-mm"
         raise InputError(f"{dataset.path}: suggests no depths; {advice}")
-    planes = FocalPlanes.at_depths(dataset.grid, depths)
+    planes = FocalPlanes.at_depths(dataset.grid, z_mm or dataset.analysis["z_mm"])
     _check_overlap(dataset.grid, planes.z_mm, "z_mm")
     return planes
 
