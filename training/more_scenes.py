@@ -8,13 +8,12 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import accumulate
-from pathlib import Path
 from random import Random
 
 import simgen
 from simgen.drawn.composition import box_of, card, colour, cylinder_of, placed, sphere
 from simgen.drawn.kinds import glossy, plain
-from training.mesh_shapes import FOLDER, blob, head, mesh_of, spindle, tube
+from training.mesh_shapes import FOLDER, blob, head, mesh_of, rod, spindle, tube
 from training.scenes import Table, any_material, log_uniform
 
 Material = Callable[[Random], Table]
@@ -126,7 +125,7 @@ def leaning(random: Random) -> simgen.Scene:
         objects.append(placed(f"thing-{number}", place, any_turn(random), shape, any_material(random)))
     if random.random() < 0.4:
         place = 0.0, random.uniform(60, 150), random.uniform(560, 640)
-        turned = random.uniform(55, 88), random.uniform(-15, 15), 0.0
+        turned = random.uniform(-88, -55), random.uniform(-15, 15), 0.0
         objects.append(placed("floor", place, turned, card(900, 420), large_material(random)))
     objects += anything_behind(random, 760)
     return composed(random, "Leaning things", objects, planes)
@@ -162,7 +161,7 @@ def meshes(random: Random) -> simgen.Scene:
         name, shape = f"{make.__name__}-{number}", mesh_of(make(random), size)
         objects.append(placed(name, place, rotation, shape, material))
     objects += anything_behind(random, planes[-1])
-    return composed(random, "Curved things", objects, planes, FOLDER)
+    return composed(random, "Curved things", objects, planes)
 
 
 def empty_wall(random: Random) -> simgen.Scene:
@@ -285,7 +284,7 @@ def narrow_things(random: Random, z_mm: float) -> list[Table]:
         [
             lambda long: card(width, long),
             lambda long: box_of(width, long, log_uniform(random, 1, 12)),
-            lambda long: cylinder_of(width / 2, long),
+            lambda long: mesh_of(rod(), width / 2, long / 2, width / 2),
         ]
     )
     spacing, tilt, long = width * log_uniform(random, 1.5, 6), random.uniform(-90, 90), 1.0
@@ -312,16 +311,20 @@ def anything_behind(random: Random, farthest_mm: float) -> list[Table]:
     return [placed("backwall", (0.0, 0.0, wall), UPRIGHT, card(1200, 1200), large_material(random))]
 
 
-def any_lights(random: Random) -> list[Table]:
-    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away."""
+def any_lights(random: Random, is_broad: bool) -> list[Table]:
+    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
+
+    What shines into glass and metals `is_broad`: of a small lamp they make rare and bright paths of light.
+    """
     sky = {"type": "uniform", "luminance_cd_m2": round(log_uniform(random, 20, 400), 1)}
-    kind = random.choice(["area", "area", "point", "spot", "directional", "none"])
+    kinds = ["area", "area", "none"] if is_broad else ["area", "area", "point", "spot", "directional", "none"]
+    kind = random.choice(kinds)
     place, target = (
         [round(random.uniform(*ends)) for ends in box]
         for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
     )
     lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
-    side, beam = log_uniform(random, 40, 300), random.uniform(3, 25)
+    side, beam = log_uniform(random, 300 if is_broad else 40, 400), random.uniform(3, 25)
     values: dict[str, Table] = {
         "area": {
             "width_mm": side,
@@ -345,19 +348,18 @@ def any_lights(random: Random) -> list[Table]:
     return [sky, {"type": kind, "illuminant": tint} | lamp]
 
 
-def composed(
-    random: Random, title: str, objects: list[Table], planes: list[int], folder: Path | None = None
-) -> simgen.Scene:
-    """The scene of these objects, whose files are in `folder`, in any light and before any backdrop."""
+def composed(random: Random, title: str, objects: list[Table], planes: list[int]) -> simgen.Scene:
+    """The scene of these objects in any light and before any backdrop."""
+    is_glossy = any("finish" in thing["material"] for thing in objects)
     dark = [[0.02, 0.02, 0.02], [0.04, 0.04, 0.05], colour(random, 0.1, 0.6)]
     values = {
         "title": title,
         "planes_mm": [float(plane) for plane in planes],
         "objects": objects,
-        "lights": any_lights(random),
+        "lights": any_lights(random, is_broad=is_glossy),
         "backdrop": {"z_mm": 2500.0, "reflectance": random.choices(dark, weights=[2, 2, 1])[0]},
     }
-    return simgen.load_scene(values, folder=folder)
+    return simgen.load_scene(values, folder=FOLDER)
 
 
 def _glass(random: Random) -> Table:
