@@ -134,15 +134,17 @@ def leaning(random: Random) -> simgen.Scene:
 def glazed(random: Random) -> simgen.Scene:
     """Things of glass, metal and shiny plastic, and some that are matt, before a wall or in a room."""
     planes = plane_depths(random, random.choice([2, 3]))
-    wall = random.uniform(planes[-1] + 50, 850)
+    wall, has_glass = random.uniform(planes[-1] + 50, 850), random.random() < 0.5
     objects = [wall_at(random, wall, large_material)]
-    if random.random() < 0.5:
+    if not has_glass and random.random() < 0.5:
         objects = walls(random, wall, random.uniform(90, 160))
     for number in range(random.randint(2, 6)):
         z = planes[number % len(planes)]
         shape, behind, _ = any_shape(random, log_uniform(random, 15, 65))
         place = random.uniform(-110, 110), random.uniform(-80, 70), z + behind
-        material = one_of(random, glossy, glossy, _glass, any_material)(random)
+        material = one_of(random, glossy, glossy, any_material)(random)
+        if has_glass and number < 2:
+            material = {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
         objects.append(placed(f"glazed-{number}", place, any_turn(random), shape, material))
     return composed(random, "Glass and gloss", objects, planes)
 
@@ -311,20 +313,25 @@ def anything_behind(random: Random, farthest_mm: float) -> list[Table]:
     return [placed("backwall", (0.0, 0.0, wall), UPRIGHT, card(1200, 1200), large_material(random))]
 
 
-def any_lights(random: Random, is_broad: bool) -> list[Table]:
+def any_lights(random: Random, finishes: set[str]) -> list[Table]:
     """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
 
-    What shines into glass and metals `is_broad`: of a small lamp they make rare and bright paths of light.
+    Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
+    So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
     """
     sky = {"type": "uniform", "luminance_cd_m2": round(log_uniform(random, 20, 400), 1)}
-    kinds = ["area", "area", "none"] if is_broad else ["area", "area", "point", "spot", "directional", "none"]
+    kinds = ["area", "area", "none"]
+    if "glass" in finishes:
+        kinds = ["none"]
+    elif not finishes:
+        kinds += ["point", "spot", "directional"]
     kind = random.choice(kinds)
     place, target = (
         [round(random.uniform(*ends)) for ends in box]
         for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
     )
     lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
-    side, beam = log_uniform(random, 300 if is_broad else 40, 400), random.uniform(3, 25)
+    side, beam = log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
     values: dict[str, Table] = {
         "area": {
             "width_mm": side,
@@ -350,17 +357,13 @@ def any_lights(random: Random, is_broad: bool) -> list[Table]:
 
 def composed(random: Random, title: str, objects: list[Table], planes: list[int]) -> simgen.Scene:
     """The scene of these objects in any light and before any backdrop."""
-    is_glossy = any("finish" in thing["material"] for thing in objects)
+    finishes = {thing["material"]["finish"]["type"] for thing in objects if "finish" in thing["material"]}
     dark = [[0.02, 0.02, 0.02], [0.04, 0.04, 0.05], colour(random, 0.1, 0.6)]
     values = {
         "title": title,
         "planes_mm": [float(plane) for plane in planes],
         "objects": objects,
-        "lights": any_lights(random, is_broad=is_glossy),
+        "lights": any_lights(random, finishes),
         "backdrop": {"z_mm": 2500.0, "reflectance": random.choices(dark, weights=[2, 2, 1])[0]},
     }
     return simgen.load_scene(values, folder=FOLDER)
-
-
-def _glass(random: Random) -> Table:
-    return {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
