@@ -45,10 +45,10 @@ def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
 
 
 def rod() -> np.ndarray:
-    """An upright prism of 16 sides, of radius and half length 1, in pieces: rays are slow to trace between
+    """An upright prism of 32 sides, of radius and half length 1, in pieces: rays are slow to trace between
     the long slivers of which a cylinder consists."""
     line = np.array([(0.0, -1.0), *((1.0, height) for height in np.linspace(-1, 1, 41)), (0.0, 1.0)])
-    return _around(line, 16)
+    return _around(line, 32)
 
 
 def blob(random: Random) -> np.ndarray:

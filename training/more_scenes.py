@@ -57,7 +57,7 @@ def heap(random: Random) -> simgen.Scene:
     materials = [one_of(random, plain, any_material)(random) for _ in range(random.choice([1, 1, 1, 2, 3]))]
     size, spread = log_uniform(random, 7, 40), log_uniform(random, 30, 90)
     size_spread, depth_spread = random.uniform(0, 0.3), log_uniform(random, 0.5, 8)
-    kind = random.choice(["ball", "box", "tin", "card"])
+    kind = random.choice(["ball", "box", "rod", "card"])
     turn = random.choice([5.0, 45.0])
     objects = []
     for number in range(round(log_uniform(random, 8, 70))):
@@ -200,6 +200,9 @@ def any_shape(random: Random, size_mm: float, kind: str | None = None) -> tuple[
             return box_of(1.8 * r * stretch, 1.8 * r / stretch, depth), depth / 2, 0.9 * r / stretch
         case "tin":
             return cylinder_of(0.8 * r / stretch, 2 * r * stretch), 0.65 * r / stretch, r * stretch
+        case "rod":  # a tin of which a scene can have many
+            radius = 0.8 * r / stretch
+            return mesh_of(rod(), radius, r * stretch, radius), 0.8 * radius, r * stretch
         case _:
             return card(2 * r * stretch, 2 * r / stretch), 0.0, r / stretch
 
