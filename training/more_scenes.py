@@ -124,8 +124,8 @@ def leaning(random: Random) -> simgen.Scene:
         place = random.uniform(-110, 110), random.uniform(-90, 90), z + behind
         objects.append(placed(f"thing-{number}", place, any_turn(random), shape, any_material(random)))
     if random.random() < 0.4:
-        place = 0.0, random.uniform(60, 150), random.uniform(560, 640)
-        turned = random.uniform(-88, -55), random.uniform(-15, 15), 0.0
+        place = 0.0, random.uniform(90, 160), random.uniform(560, 640)
+        turned = random.uniform(-90, -70), random.uniform(-15, 15), 0.0
         objects.append(placed("floor", place, turned, card(900, 420), large_material(random)))
     objects += anything_behind(random, 760)
     return composed(random, "Leaning things", objects, planes)
