@@ -21,8 +21,9 @@ FOLDER = Path(__file__).resolve().parents[1] / "out" / "training-meshes"
 """Where the files are; those that are there are not written again."""
 
 
-def mesh_of(points: np.ndarray, size_mm: float) -> Table:
-    """The shape of a grid of points (rows, columns, 3), so many millimetres for one unit."""
+def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
+    """The shape of a grid of points (rows, columns, 3), so many millimetres for one unit, along each axis or
+    along all three."""
     rows, columns, _ = points.shape
     right, up = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
     vertices = np.empty(rows * columns, [(name, "<f4") for name in "xyzst"])
@@ -39,7 +40,15 @@ def mesh_of(points: np.ndarray, size_mm: float) -> Table:
     if not file.exists():
         FOLDER.mkdir(parents=True, exist_ok=True)
         write_bytes_safely(file, content.getvalue())
-    return {"type": "mesh", "file": file.name, "scale": round(size_mm, 2)}
+    scale = [round(size_mm, 2) for size_mm in sizes_mm]
+    return {"type": "mesh", "file": file.name, "scale": scale if len(scale) > 1 else scale[0]}
+
+
+def rod() -> np.ndarray:
+    """An upright prism of 32 sides, of radius and half length 1, in pieces: rays are slow to trace between
+    the long slivers of which a cylinder consists."""
+    line = np.array([(0.0, -1.0), *((1.0, height) for height in np.linspace(-1, 1, 41)), (0.0, 1.0)])
+    return _around(line, 32)
 
 
 def blob(random: Random) -> np.ndarray:
@@ -97,9 +106,7 @@ def spindle(random: Random) -> np.ndarray:
         line = np.concatenate([[(0.0, -1.0)], side, [(0.0, 1.0)]])
     if len(line) < ROWS:
         line = _evenly(line)
-    angle = np.linspace(-math.pi, math.pi, COLUMNS + 1)
-    radius, height = (line[:, part, None] + 0 * angle for part in (0, 1))
-    return np.stack([radius * np.sin(angle), height, -radius * np.cos(angle)], axis=-1)
+    return _around(line, COLUMNS)
 
 
 def tube(random: Random) -> np.ndarray:
@@ -127,6 +134,13 @@ def tube(random: Random) -> np.ndarray:
     outward = _unit(np.cross(sideways, forward))
     angle = np.linspace(2 * math.pi, 0, ROWS // 2)[None, :, None]
     return curve[:, None] + thick * (np.cos(angle) * outward[:, None] + np.sin(angle) * sideways[:, None])
+
+
+def _around(line: np.ndarray, columns: int) -> np.ndarray:
+    """The surface (rows, columns + 1, 3) of a line (rows, 2) of radii and heights about the upright axis."""
+    angle = np.linspace(-math.pi, math.pi, columns + 1)
+    radius, height = (line[:, part, None] + 0 * angle for part in (0, 1))
+    return np.stack([radius * np.sin(angle), height, -radius * np.cos(angle)], axis=-1)
 
 
 def _globe() -> np.ndarray:

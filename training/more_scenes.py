@@ -8,13 +8,12 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import accumulate
-from pathlib import Path
 from random import Random
 
 import simgen
 from simgen.drawn.composition import box_of, card, colour, cylinder_of, placed, sphere
 from simgen.drawn.kinds import glossy, plain
-from training.mesh_shapes import FOLDER, blob, head, mesh_of, spindle, tube
+from training.mesh_shapes import FOLDER, blob, head, mesh_of, rod, spindle, tube
 from training.scenes import Table, any_material, log_uniform
 
 Material = Callable[[Random], Table]
@@ -58,7 +57,7 @@ def heap(random: Random) -> simgen.Scene:
     materials = [one_of(random, plain, any_material)(random) for _ in range(random.choice([1, 1, 1, 2, 3]))]
     size, spread = log_uniform(random, 7, 40), log_uniform(random, 30, 90)
     size_spread, depth_spread = random.uniform(0, 0.3), log_uniform(random, 0.5, 8)
-    kind = random.choice(["ball", "box", "tin", "card"])
+    kind = random.choice(["ball", "box", "rod", "card"])
     turn = random.choice([5.0, 45.0])
     objects = []
     for number in range(round(log_uniform(random, 8, 70))):
@@ -125,8 +124,8 @@ def leaning(random: Random) -> simgen.Scene:
         place = random.uniform(-110, 110), random.uniform(-90, 90), z + behind
         objects.append(placed(f"thing-{number}", place, any_turn(random), shape, any_material(random)))
     if random.random() < 0.4:
-        place = 0.0, random.uniform(60, 150), random.uniform(560, 640)
-        turned = random.uniform(55, 88), random.uniform(-15, 15), 0.0
+        place = 0.0, random.uniform(90, 160), random.uniform(560, 640)
+        turned = random.uniform(-90, -70), random.uniform(-15, 15), 0.0
         objects.append(placed("floor", place, turned, card(900, 420), large_material(random)))
     objects += anything_behind(random, 760)
     return composed(random, "Leaning things", objects, planes)
@@ -135,15 +134,17 @@ def leaning(random: Random) -> simgen.Scene:
 def glazed(random: Random) -> simgen.Scene:
     """Things of glass, metal and shiny plastic, and some that are matt, before a wall or in a room."""
     planes = plane_depths(random, random.choice([2, 3]))
-    wall = random.uniform(planes[-1] + 50, 850)
+    wall, has_glass = random.uniform(planes[-1] + 50, 850), random.random() < 0.5
     objects = [wall_at(random, wall, large_material)]
-    if random.random() < 0.5:
+    if not has_glass and random.random() < 0.5:
         objects = walls(random, wall, random.uniform(90, 160))
     for number in range(random.randint(2, 6)):
         z = planes[number % len(planes)]
         shape, behind, _ = any_shape(random, log_uniform(random, 15, 65))
         place = random.uniform(-110, 110), random.uniform(-80, 70), z + behind
-        material = one_of(random, glossy, glossy, _glass, any_material)(random)
+        material = one_of(random, glossy, glossy, any_material)(random)
+        if has_glass and number < 2:
+            material = {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
         objects.append(placed(f"glazed-{number}", place, any_turn(random), shape, material))
     return composed(random, "Glass and gloss", objects, planes)
 
@@ -162,7 +163,7 @@ def meshes(random: Random) -> simgen.Scene:
         name, shape = f"{make.__name__}-{number}", mesh_of(make(random), size)
         objects.append(placed(name, place, rotation, shape, material))
     objects += anything_behind(random, planes[-1])
-    return composed(random, "Curved things", objects, planes, FOLDER)
+    return composed(random, "Curved things", objects, planes)
 
 
 def empty_wall(random: Random) -> simgen.Scene:
@@ -199,6 +200,9 @@ def any_shape(random: Random, size_mm: float, kind: str | None = None) -> tuple[
             return box_of(1.8 * r * stretch, 1.8 * r / stretch, depth), depth / 2, 0.9 * r / stretch
         case "tin":
             return cylinder_of(0.8 * r / stretch, 2 * r * stretch), 0.65 * r / stretch, r * stretch
+        case "rod":  # a tin of which a scene can have many
+            radius = 0.8 * r / stretch
+            return mesh_of(rod(), radius, r * stretch, radius), 0.8 * radius, r * stretch
         case _:
             return card(2 * r * stretch, 2 * r / stretch), 0.0, r / stretch
 
@@ -285,7 +289,7 @@ def narrow_things(random: Random, z_mm: float) -> list[Table]:
         [
             lambda long: card(width, long),
             lambda long: box_of(width, long, log_uniform(random, 1, 12)),
-            lambda long: cylinder_of(width / 2, long),
+            lambda long: mesh_of(rod(), width / 2, long / 2, width / 2),
         ]
     )
     spacing, tilt, long = width * log_uniform(random, 1.5, 6), random.uniform(-90, 90), 1.0
@@ -312,16 +316,25 @@ def anything_behind(random: Random, farthest_mm: float) -> list[Table]:
     return [placed("backwall", (0.0, 0.0, wall), UPRIGHT, card(1200, 1200), large_material(random))]
 
 
-def any_lights(random: Random) -> list[Table]:
-    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away."""
+def any_lights(random: Random, finishes: set[str]) -> list[Table]:
+    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
+
+    Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
+    So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
+    """
     sky = {"type": "uniform", "luminance_cd_m2": round(log_uniform(random, 20, 400), 1)}
-    kind = random.choice(["area", "area", "point", "spot", "directional", "none"])
+    kinds = ["area", "area", "none"]
+    if "glass" in finishes:
+        kinds = ["none"]
+    elif not finishes:
+        kinds += ["point", "spot", "directional"]
+    kind = random.choice(kinds)
     place, target = (
         [round(random.uniform(*ends)) for ends in box]
         for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
     )
     lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
-    side, beam = log_uniform(random, 40, 300), random.uniform(3, 25)
+    side, beam = log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
     values: dict[str, Table] = {
         "area": {
             "width_mm": side,
@@ -345,20 +358,15 @@ def any_lights(random: Random) -> list[Table]:
     return [sky, {"type": kind, "illuminant": tint} | lamp]
 
 
-def composed(
-    random: Random, title: str, objects: list[Table], planes: list[int], folder: Path | None = None
-) -> simgen.Scene:
-    """The scene of these objects, whose files are in `folder`, in any light and before any backdrop."""
+def composed(random: Random, title: str, objects: list[Table], planes: list[int]) -> simgen.Scene:
+    """The scene of these objects in any light and before any backdrop."""
+    finishes = {thing["material"]["finish"]["type"] for thing in objects if "finish" in thing["material"]}
     dark = [[0.02, 0.02, 0.02], [0.04, 0.04, 0.05], colour(random, 0.1, 0.6)]
     values = {
         "title": title,
         "planes_mm": [float(plane) for plane in planes],
         "objects": objects,
-        "lights": any_lights(random),
+        "lights": any_lights(random, finishes),
         "backdrop": {"z_mm": 2500.0, "reflectance": random.choices(dark, weights=[2, 2, 1])[0]},
     }
-    return simgen.load_scene(values, folder=folder)
-
-
-def _glass(random: Random) -> Table:
-    return {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
+    return simgen.load_scene(values, folder=FOLDER)
