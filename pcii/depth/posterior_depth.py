@@ -1,7 +1,9 @@
 """Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
 
-Blocks without evidence follow their neighbours. Whether a surface is seen at all is learned as well: films of
-even light, of shading and of vignetting are part of the training, with no surface for their truth.
+Blocks without evidence follow their neighbours. Where a surface is seen is learned as well: films of even
+light, of shading and of vignetting are part of the training, with no surface for their truth. In little light
+they look like walls, so that there is a test as well: a film on which two halves of the cameras
+(`pcii.evidence.half_agreement`) agree on no structure at all has no answer.
 """
 
 from dataclasses import dataclass, field, replace
@@ -11,6 +13,7 @@ import numpy as np
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
+from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
@@ -41,6 +44,10 @@ class PosteriorDepth:
     """Their least number, in a Gaussian of weight 1 at its centre."""
     margin_blocks: int = 64
     """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
+
+    min_agreement_sigmas: float = 4.0
+    """Nothing is answered unless two halves of the cameras show the same structure somewhere on the film: of
+    1000 films of noise some seven exceed it."""
 
     def __call__(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
@@ -73,12 +80,21 @@ class PosteriorDepth:
         whole = np.s_[..., :h, :w]
         maps = probability[whole], nothing[whole], block_px, in_focus[whole]
         posterior = DepthPosterior(planes, *maps, is_detected=np.zeros((h, w), bool))
-        return replace(posterior, is_detected=self._detected(posterior, evidence.photons))
+        return replace(posterior, is_detected=self._detected(data, posterior, evidence.photons))
 
-    def _detected(self, posterior: DepthPosterior, photons: np.ndarray) -> np.ndarray:
-        """Where a surface is detected (h, w) bool: there are photons, and it is more probable than none."""
+    def _detected(
+        self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
+    ) -> np.ndarray:
+        """Where a surface is detected (h, w) bool: there are photons, it is more probable than none, and the
+        film shows structure at all."""
         plane, _, _ = posterior.most_probable()
-        return self._has_photons(photons, plane, posterior.block_px) & (posterior.no_surface < 0.5)
+        is_detected = self._has_photons(photons, plane, posterior.block_px) & (posterior.no_surface < 0.5)
+        if not is_detected.any():
+            return is_detected
+        halves = halves_of(data, posterior.planes.take(slice(None, None, 2)))
+        is_cell = np.ones(halves.inside[0].p.shape[1:], bool)
+        agreement = halves.agreement_over(slice(None), slice(None), is_cell)
+        return is_detected & (agreement >= self.min_agreement_sigmas)
 
     def network_inputs(
         self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
