@@ -45,6 +45,8 @@ class PosteriorDepth:
     margin_blocks: int = 64
     """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
 
+    max_empty: float = 0.5
+    """No surface is answered where the probability of none is higher."""
     min_agreement_sigmas: float = 4.0
     """Nothing is answered unless two halves of the cameras show the same structure somewhere on the film: of
     1000 films of noise some seven exceed it."""
@@ -85,10 +87,11 @@ class PosteriorDepth:
     def _detected(
         self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
     ) -> np.ndarray:
-        """Where a surface is detected (h, w) bool: there are photons, it is more probable than none, and the
-        film shows structure at all."""
+        """Where a surface is detected (h, w) bool: there are photons, none is not too probable, and the film
+        shows structure at all."""
         plane, _, _ = posterior.most_probable()
-        is_detected = self._has_photons(photons, plane, posterior.block_px) & (posterior.no_surface < 0.5)
+        is_detected = self._has_photons(photons, plane, posterior.block_px)
+        is_detected &= posterior.no_surface <= self.max_empty
         if not is_detected.any():
             return is_detected
         halves = halves_of(data, posterior.planes.take(slice(None, None, 2)))
