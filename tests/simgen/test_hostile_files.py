@@ -76,7 +76,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "checksum": ("a.png", png()[:-20] + b"\0\0\0\0" + png()[-16:], "damaged or cut off"),
     "two pictures": ("a.png", animation(), "holds 2 pictures"),
     "clear": ("a.png", picture("RGBA", "PNG"), "not opaque everywhere"),
-    "CMYK": ("a.jpg", picture("CMYK", "JPEG"), "a CMYK picture"),
+    "CMYK": ("a.jpg", picture("CMYK", "JPEG"), "of the kind CMYK; save it as RGB"),
     "real numbers": ("a.tif", picture("F", "TIFF"), "channels of float32; save one page"),
     "no picture": ("a.png", b"", "not a PNG, JPEG or TIFF"),
     "huge directory": ("a.tif", b"II*\0\x08\0\0\0" + b"\xff" * 4000, "cannot be read"),
