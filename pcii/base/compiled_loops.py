@@ -81,7 +81,7 @@ def shared(
 
 
 def use_threads(count: int) -> None:
-    """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
+    """Set the number of threads that run loops of this process, up to what Numba is allowed (the cores)."""
     global _threads
     _threads = count
 

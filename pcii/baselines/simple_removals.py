@@ -25,7 +25,7 @@ apart."""
 WINDOW_CELLS = 4
 PHOTONS_PER_VIEW = 10.0
 LARGEST_CELL_PX = 8
-"""The variance test pools over 4 x 4 cells of so many px that a view has about 10 photons in the window."""
+"""The variance test pools over 4 x 4 cells, as large as needed for about 10 photons of a view."""
 POISSON_QUANTILE = 0.999
 """The variance test rejects values that Poisson noise exceeds in one window of a thousand."""
 FOCUS_WINDOW = 6

@@ -18,7 +18,7 @@ AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
 PHOTO_QUALITY = 78
 """Of WebP: grain of single photons still looks like grain."""
 LOSSLESS_PX = 16_384
-"""Pictures of at most so many pixels are enlarged on pages, and their neighbours must not mix."""
+"""Largest picture, in pixels, that is stored without loss: pages enlarge it, and neighbours must not mix."""
 
 
 def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:

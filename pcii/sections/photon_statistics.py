@@ -29,7 +29,7 @@ PHOTONS_PER_WINDOW = 64.0
 SMALLEST_WINDOW_PX = 3  # smaller windows may have no site of a Bayer colour
 LARGEST_WINDOW_PX = 15
 SATURATION_BLOCK_PX = 8
-"""Light is taken as even over blocks of so many pixels to a side, colour by colour: larger ones would average
+"""Side of the blocks over which light is taken as even, colour by colour: larger ones would average
 bright spots away, smaller ones hardly ever hold two photons (docs/single_photon.md has other sizes)."""
 
 
@@ -236,7 +236,7 @@ def warn_of_saturation(data: PhotonCounts | Views) -> None:
 
 
 def _photons(counted: np.ndarray, trials: np.ndarray, readout: Readout) -> np.ndarray:
-    """Photons of blocks (N,) that have so many counts in so many pixels and frames."""
+    """Photons of blocks (N,) with `counted` counts in `trials` pixels and frames."""
     from scipy.special import digamma
 
     if readout.bits == 1:

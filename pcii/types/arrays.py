@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 MOST_DEPTHS = 10_000
-"""Longer lists, typed or stored, are rejected as errors: no stack has so many sections."""
+"""Longest list of depths, typed or stored; a longer one is taken for an error."""
 
 
 class Drawn(ShortForm):

@@ -84,7 +84,7 @@ class Readout:
         return None if self.bits is None else (1 << self.bits) - 1
 
     def check(self, n: np.ndarray) -> None:
-        """Raise `InputError` for counts of a pixel that so many frames cannot hold."""
+        """Raise `InputError` for counts of a pixel that its frames cannot hold."""
         most, largest = self.most_per_frame, int(n.max(initial=0))
         if most is not None and largest > most * self.frames:
             raise InputError(
@@ -93,7 +93,7 @@ class Readout:
             )
 
     def photons(self, counts: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Photons per pixel and exposure of which `samples` pixels in all have so many counts, float64.
+        """Photons per pixel and exposure where `samples` pixels have `counts` in all, float64.
 
         Both are whole numbers of one shape. Without a limit it is the mean, counts / samples; of one bit the
         maximum-likelihood estimate -T ln(1 - N / (V T)) of N set bits in V samples; of more bits the mean of

@@ -23,7 +23,7 @@ MIN_APART_PX = 3.0
 ONE_PLANE_PX = 0.5
 """Within this blur two objects stand in one plane, which is taken to be on purpose."""
 FOCUS_PX = 1.0
-"""A point is in focus where its blur reaches so many px to either side."""
+"""Largest reach of the blur, in px to either side, of a point that is in focus."""
 MIN_FOCUS_SHARE = 0.05
 MIN_OVERLAP = 0.5
 

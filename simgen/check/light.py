@@ -11,7 +11,7 @@ from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes, shorta
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
 MIN_PHOTONS = 100
-"""Below so many, over all views, there is hardly an object to be seen."""
+"""Fewest photons, over all views, that show an object."""
 MIN_VOXEL_COUNTS = 0.1
 MAX_OTHER_SHARE = 0.5
 """Share of the photons that may come from no object, and of the counts that no photon made."""

@@ -171,7 +171,7 @@ def probe_scene(target: Prepared) -> Facts:
 
 
 def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
-    """The same cameras with the same field of view on at most so many pixels to a side."""
+    """The same cameras with the same field of view on at most `side_px` pixels to a side."""
     return with_larger_pixels(grid, max(1.0, max(grid.height, grid.width) / side_px), least_px=1)
 
 

@@ -134,7 +134,7 @@ class CandidateSampler(ABC):
     paths_each: int
     """Light paths of a candidate that is followed."""
     max_dark_candidates: int
-    """Where so many candidates find no light there is none."""
+    """Number of candidates without light after which a place is taken as dark."""
 
     def __init__(
         self,
@@ -171,7 +171,7 @@ class CandidateSampler(ABC):
         """
 
     def count_paths(self, candidates: int, followed: int) -> int:
-        """Light paths of so many candidates, of which some are followed beyond their first hit."""
+        """Light paths of `candidates`, of which `followed` go on beyond their first hit."""
         return candidates + (self.paths_each - 1) * followed
 
     def require_finite(self, radiance: np.ndarray, object_id: np.ndarray) -> None:
