@@ -11,7 +11,7 @@ from simgen.renderer.mitsuba_scene import RenderScene, shape_number
 SHY_OF_TARGET = 1e-4
 """A ray to a target stops this share of its length before it."""
 PART = 1 << 14
-"""Number of rays that are Python numbers at once in scalar mode: more would take several times NumPy's memory."""
+"""Rays that are Python numbers at once in scalar mode, where they take several times NumPy's memory."""
 
 
 def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
