@@ -20,6 +20,7 @@ import numpy as np
 import pcii
 from pcii.base.safe_files import write_bytes_safely
 from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import total_disparity_px
@@ -90,6 +91,7 @@ def example_of(counts: PhotonCounts, truth: Truth, z_mm: np.ndarray, rng: np.ran
     grid = counts.grid
     planes = FocalPlanes.between(grid, rng.uniform(*NEAR) * z_mm.min(), rng.uniform(*FAR) * z_mm.max(), 1.0)
     method = PosteriorDepth()
+    counts = without_hot_pixels(counts)
     evidence = evidence_of_texture(counts, planes, method.block_px, method.model)
     inputs = method.network_inputs(evidence, planes, method.block_px, np.zeros(0))._asdict()
     del inputs["hint"]
