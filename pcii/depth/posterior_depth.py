@@ -1,9 +1,8 @@
 """Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
 
-Blocks without evidence follow their neighbours. Where a surface is seen is learned as well: films of even
-light, of shading and of vignetting are part of the training, with no surface for their truth. In little light
-they look like walls, so that there is a test as well: a film on which two halves of the cameras
-(`pcii.evidence.half_agreement`) agree on no structure at all has no answer.
+Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
+largest value. So a connected region that may be a surface has an answer if two halves of the cameras show the
+same structure in a part of it (`pcii.evidence.half_agreement`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -13,6 +12,7 @@ import numpy as np
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
+from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
@@ -46,10 +46,13 @@ class PosteriorDepth:
     """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
 
     max_empty: float = 0.5
-    """No surface is answered where the probability of none is higher."""
-    min_agreement_sigmas: float = 4.0
-    """Nothing is answered unless two halves of the cameras show the same structure somewhere on the film: of
-    1000 films of noise some seven exceed it."""
+    """A surface is answered where the probability of none is at most this, and two halves of the cameras"""
+    clear_photons: float = 40.0
+    """With fewer in 8 x 8 px on average, of all views, agreement is seen over the whole film at best."""
+    min_film_agreement: float = 4.0
+    """Its least t then: of 1000 films of noise some seven exceed it."""
+    min_agreed_share: float = 0.02
+    """show the same structure in this share of the connected region: of noise they do in 1 cell of 1000."""
 
     def __call__(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
@@ -87,17 +90,21 @@ class PosteriorDepth:
     def _detected(
         self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
     ) -> np.ndarray:
-        """Where a surface is detected (h, w) bool: there are photons, none is not too probable, and the film
-        shows structure at all."""
+        """Where a surface is detected (h, w) bool."""
+        from scipy.ndimage import label
+
         plane, _, _ = posterior.most_probable()
-        is_detected = self._has_photons(photons, plane, posterior.block_px)
-        is_detected &= posterior.no_surface <= self.max_empty
-        if not is_detected.any():
-            return is_detected
-        halves = halves_of(data, posterior.planes.take(slice(None, None, 2)))
-        is_cell = np.ones(halves.inside[0].p.shape[1:], bool)
-        agreement = halves.agreement_over(slice(None), slice(None), is_cell)
-        return is_detected & (agreement >= self.min_agreement_sigmas)
+        is_possible = self._has_photons(photons, plane, posterior.block_px)
+        if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows none
+            is_possible &= posterior.no_surface <= self.max_empty
+        if isinstance(data, PhotonCounts) and photons.mean() < self.clear_photons:
+            return is_possible & (_agreement_of_film(data, posterior.planes) >= self.min_film_agreement)
+        agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, is_possible) & is_possible
+        region, count = label(is_possible)
+        agreed_share = np.bincount(region.ravel(), agree.ravel(), count + 1) / np.bincount(
+            region.ravel(), minlength=count + 1
+        ).clip(min=1)
+        return agree | is_possible & (agreed_share >= self.min_agreed_share)[region]
 
     def network_inputs(
         self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
@@ -147,3 +154,32 @@ def depth_map_of(posterior: DepthPosterior) -> DepthMap:
     depth_mm = np.where(posterior.is_detected, depth_of_total_disparity_mm(grid, total_px), np.nan)
     maps = depth_mm, np.where(posterior.is_detected, confidence, 0.0)
     return DepthMap(*(on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps))
+
+
+def _agreement_of_film(counts: PhotonCounts, planes: FocalPlanes) -> float:
+    """How well two halves of the cameras agree on structure anywhere on the film, as t."""
+    halves = halves_of(counts, planes.take(slice(None, None, 2)))
+    is_cell = np.ones(halves.inside[0].p.shape[1:], bool)
+    return halves.agreement_over(slice(None), slice(None), is_cell)
+
+
+def _halves_agree(
+    data: PhotonCounts | Views, planes: FocalPlanes, best: np.ndarray, block_px: int, where: np.ndarray
+) -> np.ndarray:
+    """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
+
+    Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
+    `where` (h, w) bool are is_wanted about; the windows around no others are summed.
+    """
+    every_other = planes.take(slice(None, None, 2))
+    i, j = (
+        np.minimum(np.arange(-(-size // CELL_PX)) * CELL_PX // block_px, blocks - 1)
+        for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)
+    )
+    plane = best[np.ix_(i, j)] // 2
+    is_wanted = np.zeros(plane.shape, bool)
+    i, j = (index * block_px // CELL_PX for index in np.nonzero(where))
+    is_wanted[i, j] = True
+    agree = halves_of(data, every_other, out_of_focus=True).agree(plane, is_wanted)
+    agree = on_pixels(agree, CELL_PX, data.grid.shape_HW)
+    return agree[::block_px, ::block_px]
