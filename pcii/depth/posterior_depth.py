@@ -6,6 +6,7 @@ same structure in a part of it (`pcii.evidence.half_agreement`).
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -100,11 +101,11 @@ class PosteriorDepth:
         if isinstance(data, PhotonCounts) and photons.mean() < self.clear_photons:
             return is_possible & (_agreement_of_film(data, posterior.planes) >= self.min_film_agreement)
         agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, is_possible) & is_possible
-        region, count = label(is_possible)
-        agreed_share = np.bincount(region.ravel(), agree.ravel(), count + 1) / np.bincount(
-            region.ravel(), minlength=count + 1
-        ).clip(min=1)
-        return agree | is_possible & (agreed_share >= self.min_agreed_share)[region]
+        labelled: Any = label(is_possible)
+        region = np.asarray(labelled[0]).ravel()
+        cells = np.bincount(region).clip(min=1)
+        agreed_share = (np.bincount(region, agree.ravel()) / cells)[region].reshape(agree.shape)
+        return agree | is_possible & (agreed_share >= self.min_agreed_share)
 
     def network_inputs(
         self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
