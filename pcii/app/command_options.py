@@ -68,7 +68,7 @@ ExpectedDepths = Annotated[
     Depths,
     Parameter(
         help="Depth in mm of a plane in which objects are expected, or start:stop:step; repeat for more. "
-        "Default: those that the dataset suggests. Methods other than posterior are not told."
+        "Default: those that the dataset suggests. Only the method posterior uses them."
     ),
 ]
 DepthRange = Annotated[

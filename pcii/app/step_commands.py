@@ -32,8 +32,8 @@ from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.estimates import DepthMap
 from pcii.types.photon_limit import Light
 
-LOW_ANSWERED_SHARE = 0.1
-"""A depth map that answers for a smaller share of the photons is warned of."""
+MIN_ANSWERED_SHARE = 0.1
+"""Smallest share of the photons that a depth map answers for without a warning."""
 
 
 def run(
@@ -217,7 +217,7 @@ def _warn_of_few_depths(depth_map: DepthMap, data: Dataset, z_range_mm: tuple[fl
     if data.has_counts:  # in the dark there is nothing to answer for
         weight = reconstruct_sections(data.counts, float(np.mean(z_range_mm))).counts[0].sum(axis=-1)
     share = float(weight[np.isfinite(depth_map.z_mm)].sum() / max(weight.sum(), 1))
-    if share >= LOW_ANSWERED_SHARE:
+    if share >= MIN_ANSWERED_SHARE:
         return
     if min(grid.rows, grid.cols) == 1:
         reason = f"the {grid.rows} x {grid.cols} cameras stand in a line, and see depth at few edges"

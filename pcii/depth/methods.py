@@ -56,8 +56,8 @@ def estimate_depth(
     `method` is one of `pcii.depth_methods()`, or a function that returns a `DepthMap` for the data and the
     range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
     by the smoothness of surfaces and by a network that has seen many (docs/theory.md); `depth_posterior` has
-    all of it. It is told the depths `z_mm` (Z,) of planes in which objects are expected, if any are given;
-    other methods are not. "focus", of photon counts, compares how well planes predict the photons, and
+    all of it. It alone uses `z_mm` (Z,), the depths of planes in which objects are expected, if any are
+    given. "focus", of photon counts, compares how well planes predict the photons, and
     abstains more.
     "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
     methods to compare with, which answer wherever there are samples.

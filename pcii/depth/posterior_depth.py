@@ -47,13 +47,15 @@ class PosteriorDepth:
     """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
 
     max_empty: float = 0.5
-    """A surface is answered where the probability of none is at most this, and two halves of the cameras"""
+    """Largest probability of no surface where one is answered."""
     clear_photons: float = 40.0
-    """With fewer in 8 x 8 px on average, of all views, agreement is seen over the whole film at best."""
+    """Mean number of photons of all views in 8 x 8 px below which the whole film is tested, since no part of
+    it is clear enough."""
     min_film_agreement: float = 4.0
-    """Its least t then: of 1000 films of noise some seven exceed it."""
+    """Smallest t of a whole film that has answers. Some seven of 1000 films of noise exceed it."""
     min_agreed_share: float = 0.02
-    """show the same structure in this share of the connected region: of noise they do in 1 cell of 1000."""
+    """Smallest share of a connected region in which two halves of the cameras show the same structure. A
+    smaller one would let noise pass, of which they agree in 1 cell of 1000."""
 
     def __call__(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
@@ -98,8 +100,9 @@ class PosteriorDepth:
         is_possible = self._has_photons(photons, plane, posterior.block_px)
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows none
             is_possible &= posterior.no_surface <= self.max_empty
-        if isinstance(data, PhotonCounts) and photons.mean() < self.clear_photons:
-            return is_possible & (_agreement_of_film(data, posterior.planes) >= self.min_film_agreement)
+            area_ratio = (posterior.block_px / self.block_px) ** 2
+            if photons.mean() / area_ratio < self.clear_photons:
+                return is_possible & (_agreement_of_film(data, posterior.planes) >= self.min_film_agreement)
         agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, is_possible) & is_possible
         labelled: Any = label(is_possible)
         region = np.asarray(labelled[0]).ravel()

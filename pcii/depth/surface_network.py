@@ -45,8 +45,8 @@ class NetworkOutputs(NamedTuple):
 def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkOutputs:
     """What the network says of the blocks of the inputs.
 
-    `requested_planes` (R,) are numbers of planes, in fractions, that a mask is asked for; `inputs.hint` says
-    the same to the network.
+    `requested_planes` (R,) are the positions of the requested planes among those of the inputs: 0 is the
+    first, 1.5 lies between the second and the third. `inputs.hint` holds the same request.
     """
     import onnxruntime
     from scipy.special import expit, logsumexp, softmax

@@ -94,23 +94,25 @@ def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
     scenes = frame["scene"].nunique()
     over = "scene" if scenes > 1 else "identity"
     for (decisive, title), names in zip(TITLES.items(), (REMOVAL, DEPTH), strict=True):
-        own = of_cells[of_cells["measure"] == decisive]
-        if not len(own):
+        means = of_cells[of_cells["measure"] == decisive]
+        if not len(means):
             continue
         ranked = ranks(frame, decisive, over)
         if len(ranked):
             unit = "scenes" if over == "scene" else "datasets"
             yield rank_table(ranked, f"{title}, methods compared on the same {unit}", unit)
-        yield mean_table(f"{title} by photon budget", own, ["scene", "method"], "light", light_name)
+        yield mean_table(f"{title} by photon budget", means, ["scene", "method"], "light", light_name)
         if scenes <= MAX_DETAILED_SCENES:
-            yield _measure_table(f"{title} beside other measures", of_cells, own, names)
+            yield _measure_table(f"{title} beside other measures", of_cells, means, names)
 
 
-def _measure_table(title: str, of_cells: "DataFrame", own: "DataFrame", names: Mapping[str, str]) -> Table:
-    """The measures `names` of the methods that `own` is of, by scene, light and method."""
+def _measure_table(title: str, of_cells: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> Table:
+    """The measures `names` of the methods in `means`, by scene, light and method."""
     import pandas as pd
 
-    shown = of_cells[of_cells["measure"].isin(list(names)) & of_cells["method"].isin(own["method"].unique())]
+    shown = of_cells[
+        of_cells["measure"].isin(list(names)) & of_cells["method"].isin(means["method"].unique())
+    ]
     shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
     return mean_table(title, shown, ["scene", "light", "method"], "measure", lambda name: names[name])
 

@@ -27,7 +27,7 @@ MAX_CAMERAS = 5
 COARSE_CELLS, FINE_CELLS = 128, 512
 """Largest side of the views in cells, to try orders and to place depths."""
 MIN_CELLS = 16
-"""Smaller views are not judged."""
+"""Smallest side of views that are judged."""
 PHOTONS_PER_CELL = 4.0
 """Of counts; with fewer the noise hides the texture."""
 BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0

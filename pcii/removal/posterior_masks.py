@@ -1,4 +1,4 @@
-"""Removal of defocused points by the network that is told which planes are requested.
+"""Removal of defocused points by the network of depth, whose inputs include the requested planes.
 
 The network (`pcii.depth.surface_network`) gives each block the probability that the surface seen there
 belongs to an object in focus at each requested plane, or to none of them. A block belongs to the most
