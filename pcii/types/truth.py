@@ -81,9 +81,17 @@ class Truth(Drawn):
         return bool((self.object_id > 0).any())
 
     @property
+    def is_unscored(self) -> np.ndarray:
+        """Pixels (H, W) bool of the objects that count in no score."""
+        return np.isin(self.object_id, [*self.unscored])
+
+    @property
     def object_z_mm(self) -> np.ndarray:
-        """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
-        return np.where(self.object_id > 0, self.z_mm, np.inf) if self.has_objects else self.z_mm
+        """Depth of the objects that are scored (H, W) in mm, +inf elsewhere; of everything, if no object is
+        known."""
+        if not self.has_objects:
+            return self.z_mm
+        return np.where((self.object_id > 0) & ~self.is_unscored, self.z_mm, np.inf)
 
 
 def _check_map(
