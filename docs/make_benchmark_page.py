@@ -40,8 +40,8 @@ times are of {machine}.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
-*Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws of
-photons. What leans belongs to no one plane: it counts by pixel and in depth.*
+*Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws
+of photons. What leans belongs to no one plane: it counts by pixel and in depth.*
 
 ## Where the likelihood method's IoU falls with more photons
 
