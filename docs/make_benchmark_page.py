@@ -19,7 +19,7 @@ from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import by_scene
 from pcii.evaluation.rows import frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import lines_of, means
+from pcii.evaluation.summary import lines_of, means, with_yardsticks
 from pcii.evaluation.tables import with_interval
 from pcii.figures.charts import quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
@@ -40,9 +40,8 @@ times are of {machine}.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
-*Mean IoU with the objects of each plane over the scenes of a kind, each the mean of its draws of photons.
-What leans or is a wall belongs to no one plane: there even the oracle's masks have 0.04 to 0.51, and depth
-tells more.*
+*Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws
+of photons. What leans belongs to no one plane: it counts by pixel and in depth.*
 
 ## Where the likelihood method's IoU falls with more photons
 
@@ -68,7 +67,7 @@ def main(submissions: Path, machine: str) -> None:
 def results(submissions: Path) -> pd.DataFrame:
     """Means over draws of what was measured of removal, without binary frames: see `summary.means`."""
     rows = [row for file in sorted(submissions.glob(f"*/{SUBMISSION}")) for row in read_rows(file.parent)]
-    table = means(frame_of(by_scene(rows)))
+    table = means(with_yardsticks(frame_of(by_scene(rows))))
     methods = table["method"][table["measure"] == "iou"].unique()
     return table[table["method"].isin(methods) & ~table["scene"].astype(str).str.endswith(IN_FRAMES)]
 
@@ -86,6 +85,7 @@ def falls(table: pd.DataFrame) -> Iterator[str]:
 def draw(table: pd.DataFrame, kinds: Mapping[str, str], file: Path) -> None:
     """Mean IoU of each kind against photons (above) and against seconds (below)."""
     values = table.pivot(index=["scene", "method", "light"], columns="measure", values="mean").reset_index()
+    values = values.dropna(subset="iou")
     values["kind"] = [kinds[scene] for scene in values["scene"]]
     shown = [kind for kind in dict.fromkeys(kinds.values()) if kind in set(values["kind"])]
     figure, axes = plt.subplots(2, len(shown), figsize=(14, 5.6), sharey=True, layout="constrained")

@@ -65,12 +65,12 @@ ENTRIES = {
 def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_light() -> None:
     errors = {
         ("a", 30.0, "focus"): 0.25,
-        ("a", 30.0, "likelihood-sweep"): 0.5,
+        ("a", 30.0, "sweep-17"): 0.5,
         ("a", 30.0, "variance-sweep"): 0.75,
         ("a", 100.0, "focus"): 0.5,
         ("a", 100.0, "variance-sweep"): 0.25,
         ("b", 30.0, "focus"): 0.75,
-        ("b", 30.0, "likelihood-sweep"): 0.5,
+        ("b", 30.0, "sweep-17"): 0.5,
         ("b", 30.0, "variance-sweep"): 0.25,
         ("c", 30.0, "focus"): 0.5,
         ("d", 30.0, "focus"): 0.5,  # of no scene of the corpus

@@ -19,6 +19,7 @@ from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
 from pcii.evaluation.summary import lines_of
+from pcii.evaluation.tables import SWEEPS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,11 +37,11 @@ MEASURES = {
 MASKS = {
     "iou": "iou",
     "boundary_f": "boundary_f",
-    "iou_of_oracle": "pixel_iou_oracle",
+    "iou_by_pixel": "pixel_iou",
 }
-DEFAULT, SWEEPS = depth_name("posterior"), (depth_name("likelihood-sweep"), depth_name("variance-sweep"))
+DEFAULT = depth_name("posterior")
 NOT_WORSE = 1.0
-"""What the errors of the better sweep are to be at least, relative to those of the default."""
+"""What the errors of the best sweep are to be at least, relative to those of the default."""
 LEAST_SHARE = 1e-3
 """Shares of errors below this are as good as none when a ratio is taken."""
 
@@ -110,12 +111,13 @@ def _value(row: Any, scale: float = 1.0) -> Value:
 
 
 def _ratios(rows: list[Row]) -> list[Ratio]:
-    """How much larger the better plane sweep's share of errors is than that of the default method."""
+    """How much larger the best plane sweep's share of errors is than that of the default method."""
     found: list[Ratio] = []
     measured = Measured(rows)
     for row in measured.of(DEPTH):
         if row.name == DEFAULT and "bad_1px_percent" in row.values:
-            sweeps = [each for each in measured.of(DEPTH, **row.parameters) if each.name in SWEEPS]
+            names = {depth_name(sweep) for sweep in SWEEPS}
+            sweeps = [each for each in measured.of(DEPTH, **row.parameters) if each.name in names]
             if not sweeps:
                 continue
             best, own = (
@@ -124,7 +126,7 @@ def _ratios(rows: list[Row]) -> list[Ratio]:
             )
             where = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons"
             found.append(
-                Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own), NOT_WORSE)
+                Ratio(f"{where}: errors of the best sweep against {DEFAULT}", Value(best / own), NOT_WORSE)
             )
     return found
 

@@ -9,7 +9,7 @@ from pcii.evaluation.tables import Table
 
 NUMBERS = {
     "iou": "IoU",
-    "iou_oracle": "oracle",
+    "everything": "IoU of all claimed",
     "precision": "precision",
     "recall": "recall",
     "f1": "F1",
@@ -19,6 +19,7 @@ NUMBERS = {
     "entropy_before": "entropy before",
     "entropy_after": "entropy after",
     "claimed_share": "claimed share",
+    "false_share": "claimed falsely",
 }
 """Columns of the scores after those that say what is scored."""
 
@@ -49,9 +50,7 @@ def entropy_table(outcome: Outcome) -> Table:
 
 def score_table(outcome: Outcome) -> Table:
     """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
-    planes = outcome.score.planes
-    oracles = outcome.score.bounds["planes"] or [{"iou_oracle": None}] * len(planes)
-    rows = [{**row, "iou_oracle": bound["iou_oracle"]} for row, bound in zip(planes, oracles, strict=True)]
+    rows = [{**row, "everything": row["everything"]["iou"]} for row in outcome.score.planes]
     words = ["plane", "method", "truth", "objects"]
     if outcome.dataset.truth is None:
         words, rows = words[:2], [row for row in rows if row["truth"] == "object"]
@@ -73,13 +72,20 @@ def depth_table(outcome: Outcome) -> Table:
         has_objects = truth is not None and truth.has_objects
         where = "the objects' pixels" if has_objects else "all pixels with a true depth"
         rows.append((f"share with an estimate, of {where}", f"{depth['coverage']:.1%}"))
-        for name, key in (("median error", "median"), ("mean error", "mae"), ("median signed error", "bias")):
+        for limit in (1, 3):
+            name = f"within {limit} px of total disparity (by the best answer of one depth everywhere)"
+            of_one_depth = depth["one_depth"][f"within_{limit}px"]
+            rows.append((name, f"{depth[f'within_{limit}px']:.1%} ({of_one_depth:.1%})"))
+        for name, key in (
+            ("median error of all of them", "median"),
+            ("mean error of those with an estimate", "mae"),
+            ("median signed error of those with an estimate", "bias"),
+        ):
             if depth[f"{key}_mm"] is not None:
                 value = f"{depth[f'{key}_mm']:.2f} mm, {depth[f'{key}_px']:.2f} px of total disparity"
-                rows.append((f"{name} of those", value))
-        for limit in (1, 3):
-            name = f"off by more than {limit} px of total disparity, or no estimate"
-            rows.append((name, f"{depth[f'bad_{limit}px']:.1%}"))
+                rows.append((name, value))
+        scores = f"{depth['quadratic_score']:.3f} ({depth['one_depth']['quadratic_score']:.3f})"
+        rows.append(("quadratic score of the confidence (of one depth)", scores))
     if depth["ece"] is not None:
         rows.append(("expected calibration error of the confidence", f"{depth['ece']:.3f}"))
     for row in outcome.score.bounds["objects"]:

@@ -130,7 +130,7 @@ def depth(
     Parameters
     ----------
     method
-        posterior or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
+        posterior or variance-sweep; of counts also focus, sweep-9, sweep-17 or sweep-33, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
     data = dataset_at(dataset, budget)

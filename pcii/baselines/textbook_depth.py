@@ -10,6 +10,7 @@ plane with the clearest slope decides.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,8 @@ STEP_PX = 1.0
 BATCH = 8
 """Planes made at a time: views that stay on disk are read once for all of them."""
 VARIANCE_WINDOW_PX = 7
-LIKELIHOOD_SIGMA_PX = 17 / 4
-"""Standard deviation of the Gaussian window of the likelihood: its middle 95 % are 17 px wide."""
+SIGMAS_PER_WINDOW = 4
+"""The middle 95 % of a Gaussian window of the likelihood are as wide as the window."""
 WIDER = 2.0
 """The wider window by the window; with 1 and 4 errors are nearly the same."""
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-9
@@ -66,7 +67,7 @@ def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) 
     return _swept(data, z_range_mm, evenness, variance=True)
 
 
-def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthMap:
+def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float], window_px: float) -> DepthMap:
     """The depth at which the photons of each view are predicted best by those of the other views.
 
     The rate of a sample of m photons, of a voxel of K photons in n samples, is
@@ -76,6 +77,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     """
     from scipy.ndimage import gaussian_filter
 
+    sigma_px = window_px / SIGMAS_PER_WINDOW
     events = data.events
     squared = None  # where no pixel has two photons they are their own squares; beyond 2^40 they are refused
     if events.n.max(initial=0) > 1:
@@ -94,7 +96,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     def gain(sections: Sections, plane: int) -> np.ndarray:
         photons, samples = (in_cells(sums[plane]) for sums in (sections.counts, sections.coverage))
         around, reached = (
-            gaussian_filter(sums, WIDER * LIKELIHOOD_SIGMA_PX / side, mode="constant", axes=(0, 1))
+            gaussian_filter(sums, WIDER * sigma_px / side, mode="constant", axes=(0, 1))
             for sums in (photons, samples)
         )
         mean = np.maximum(around / np.maximum(reached, LEAST_SAMPLES), LEAST_RATE)
@@ -109,10 +111,14 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
         expected = (photons * np.maximum(samples - 1, 0) + samples * PRIOR_PHOTONS) / weight
         nats = photons * np.log(rate / mean) - (expected - samples * mean)
         nats = np.where(around > 0, nats, 0.0)
-        smooth = gaussian_filter(nats.sum(axis=-1), LIKELIHOOD_SIGMA_PX / side, mode="constant")
+        smooth = gaussian_filter(nats.sum(axis=-1), sigma_px / side, mode="constant")
         return on_pixels(smooth, side, data.grid.shape_HW)
 
     return _swept(data, z_range_mm, gain)
+
+
+sweep_9, sweep_17, sweep_33 = (partial(likelihood_sweep, window_px=width) for width in (9, 17, 33))
+"""Windows that show fine things in much light, and large things in little."""
 
 
 def _swept(

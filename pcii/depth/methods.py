@@ -30,7 +30,7 @@ Method = Callable[..., DepthMap]
 FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
     "focus": focus_depth,
-    "likelihood-sweep": "pcii.baselines.textbook_depth:likelihood_sweep",
+    **{f"sweep-{width}": f"pcii.baselines.textbook_depth:sweep_{width}" for width in (9, 17, 33)},
     "variance-sweep": "pcii.baselines.textbook_depth:variance_sweep",
 }
 FOR_VIEWS: dict[str, Method | str] = {
@@ -57,10 +57,10 @@ def estimate_depth(
     range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
     by the smoothness of surfaces and by a network that has seen many (docs/theory.md); `depth_posterior` has
     all of it. It alone uses `z_mm` (Z,), the depths of planes in which objects are expected, if any are
-    given. "focus", of photon counts, compares how well planes predict the photons, and
-    abstains more.
-    "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
-    methods to compare with, which answer wherever there are samples.
+    given. "focus", of photon counts, compares how well planes predict the photons, and abstains more.
+    "sweep-9", "sweep-17" and "sweep-33", of photon counts and with windows of as many px, "variance-sweep"
+    and, of radiance, "structure-tensor" are textbook methods to compare with, which answer wherever there are
+    samples.
 
     Warns of frames whose saturation removed more than 2 % of the photons. Raises `InputError` for a range
     that is not 0 < near < far, a single view, a method that is not known or cannot take the data, or one of
@@ -113,7 +113,7 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     Raises `InputError` for a registered name that is already taken or no file name.
 
     >>> depth_methods()
-    ('posterior', 'focus', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
+    ('posterior', 'focus', 'sweep-9', 'sweep-17', 'sweep-33', 'variance-sweep', 'structure-tensor')
     """
     return REGISTRY.names(_built_in(data))
 

@@ -11,7 +11,7 @@ from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene, read_sco
 from pcii.evaluation.pages import accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks
+from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks, with_yardsticks
 from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
 from pcii.store.collection import IN_FRAMES
 
@@ -37,17 +37,39 @@ COMPARISONS = (
     Comparison(
         "Removal of defocused points",
         "iou",
-        "IoU with the objects of each plane: more is better. The oracle knows the true depth of each pixel",
-        "iou_oracle",
-        "oracle (masks from the true depth)",
+        "IoU with the objects of each plane, mean over planes that hold objects: more is better. What leans "
+        "through the depths belongs to no plane",
     ),
-    Comparison("Depth", "bad_1px", "Share of pixels off by more than 1 px: less is better"),
+    Comparison(
+        "Removal by pixel",
+        "pixel_iou",
+        "IoU with the points within 1 px of blur at each plane, whatever they belong to: more is better",
+    ),
+    Comparison(
+        "Claimed falsely",
+        "false_share",
+        "Share of the film that is claimed at a plane to whose objects it does not belong: less is better, "
+        "and 0 is who claims nothing",
+    ),
+    Comparison(
+        "Depth within 1 px",
+        "within_1px",
+        "Share of the objects' pixels whose depth is within 1 px of total disparity, no answer being a wrong "
+        "one: more is better",
+    ),
+    Comparison("Depth within 3 px", "within_3px", "The same within 3 px: more is better"),
+    Comparison(
+        "Confidence",
+        "quadratic_score",
+        "Share within 1 px minus the Brier score of confidence, over the objects' pixels: more is better, 0 "
+        "is who never answers, 1 who is always right and sure",
+    ),
     Comparison(
         "Error of depth",
         "median_px",
-        "Median error of the pixels with an answer, geometric mean over scenes: less is better. The "
-        "Cramér-Rao bound is the least standard deviation of the depth of an object as a whole, given its "
-        "photons and its texture; median over the objects of a scene",
+        "Median error of the objects' pixels, geometric mean over scenes of which most pixels have an "
+        "answer: less is better. The Cramér-Rao bound is the least standard deviation of the depth of an "
+        "object as a whole, given its photons and its texture; median over the objects of a scene",
         "bound_px",
         "bound for whole objects (Cramér-Rao)",
     ),
@@ -77,7 +99,7 @@ def write_page(folder: Path, out: Path) -> int:
             if folder_of.setdefault(method, inside) != inside:
                 names = f"{folder_of[method].name} and {inside.name}"
                 raise InputError(f"{folder}: {names} are both of {method!r}")
-    frame = frame_of(rows)
+    frame = with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
     about = next(iter(submissions.values()))

@@ -41,12 +41,15 @@ class Evaluation:
     made_again: tuple[str, ...] = ()
 
     def means(self, by: Sequence[str] = summary.CELL) -> "DataFrame":
-        """Means of every measure over datasets, with their 95 % intervals: see `summary.means`."""
-        return summary.means(self.frame, by)
+        """Means of every measure over datasets, with their 95 % intervals: see `summary.means`.
+
+        Beside methods they are of what looks at no photon: see `summary.YARDSTICKS`.
+        """
+        return summary.means(summary.with_yardsticks(self.frame), by)
 
     def ranks(self, measure: str = "iou") -> "DataFrame":
         """Methods by their mean over scenes, compared with the best one: see `summary.ranks`."""
-        return summary.ranks(self.frame, measure)
+        return summary.ranks(summary.with_yardsticks(self.frame), measure)
 
 
 def evaluate(

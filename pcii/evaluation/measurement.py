@@ -89,8 +89,7 @@ class EvaluationJob:
             return row | {"depth": depth} | self._bound(task, data, seen)
         result = score(estimate, None, truth)
         planes = [
-            {name: value for name, value in (bound | plane).items() if name != "method"}
-            for plane, bound in zip(result.planes, result.bounds["planes"], strict=True)
+            {name: value for name, value in plane.items() if name != "method"} for plane in result.planes
         ]
         return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 

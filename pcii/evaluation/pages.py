@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.summary import SIGNS, means, means_over_scenes
-from pcii.evaluation.tables import Table, light_name, tables_of
+from pcii.evaluation.summary import means, means_over_scenes, with_yardsticks
+from pcii.evaluation.tables import NOT_BETTER, TITLES, Table, light_name, tables_of
 from pcii.figures.charts import accuracy_chart, calibration_chart
 from pcii.figures.panels import figure_uri
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
@@ -22,13 +22,18 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 AXES = {
-    "iou": "IoU, mean over planes",
-    "bad_1px": "share of errors of depth above 1 px",
+    "iou": "IoU, mean over planes that hold objects",
+    "pixel_iou": "IoU with the points in focus, mean over planes",
+    "false_share": "share of the film claimed falsely",
+    "within_1px": "share of depths within 1 px",
+    "within_3px": "share of depths within 3 px",
+    "quadratic_score": "quadratic score of confidence",
     "median_px": "median error of depth, px of total disparity",
 }
 """Measures of accuracy that are drawn, with the labels of their axes."""
 NOTES = (
-    "Scores compare masks with the objects that belong to each plane, and are means over the planes. In "
+    "IoU compares masks with the objects that belong to each plane, and is a mean over planes that hold any. "
+    "What leans through the depths belongs to no plane: it counts in the IoU of pixels, and in depth. In "
     "brackets: 95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the "
     "logarithm of the mean for seconds and other values that are never negative.",
     "In bold: the best mean of the same scene and photons. Others may be as good: see the interval of the "
@@ -37,10 +42,14 @@ NOTES = (
     "comparisons. Of n pairs it cannot be less than 2 / 2^n, so fewer than six never give 0.05.",
     "Over several scenes every scene counts once, as the mean over its seeds. Ranks are of the scenes and "
     "seeds that all methods have; their intervals and p are of the spread between scenes.",
-    "Depth: errors are in px of total disparity, over the objects' pixels, and less is better; a missing "
-    "answer is an error above 1 px. Bound: the least standard deviation of the depth of an object as a whole "
-    "(Cramér-Rao), median of the objects. ECE: how far confidence and the share of depths within 1 px are "
-    "apart on average, over all answered pixels.",
+    "Rows in parentheses look at no photon: who claims and answers nothing, who claims everything at every "
+    "plane, and who answers the one depth that is right for most pixels, which only the truth tells. Sweeps "
+    f"are the simplest methods of depth. {NOT_BETTER}: no better than the best of these there.",
+    "Depth: shares are of the objects' pixels, within 1 or 3 px of total disparity, and a missing answer is "
+    "a wrong one, in the median too. Quadratic score: share within 1 px minus the Brier score of confidence; "
+    "0 is who never answers, 1 who is always right and sure. Bound: the least standard deviation of the "
+    "depth of an object as a whole (Cramér-Rao), median of the objects. ECE: how far confidence and the "
+    "share of depths within 1 px are apart on average, over all answered pixels.",
 )
 
 
@@ -80,6 +89,7 @@ def write_evaluation(
     `others` are further files to list. The caller keeps others from adding rows meanwhile.
     """
     sweep_temporaries(out)
+    frame = with_yardsticks(frame)
     of_cells = means(frame)
     differing = ", ".join(origin["differing"])
     warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
@@ -102,7 +112,7 @@ def _plots(table: "DataFrame") -> list[tuple[str, str]]:
     """Pictures of means by method and light, with what they show in words."""
     plots: list[tuple[str, str]] = []
     methods: list[str] = []
-    for measure in SIGNS:
+    for measure in TITLES:
         methods = sorted(table["method"][table["measure"] == measure].unique())
         plots.append((accuracy_plot(table, methods, measure), f"{AXES[measure]} against photons and time"))
     plots.append((_calibration_plot(table, methods), "share of correct depths against confidence, by light"))

@@ -6,7 +6,7 @@ software made it, is added below, and the last row counts.
 The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
 docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
 other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
-blur, `bad_1px` and the other errors of depth, with dots for what is nested, `bound_px`.
+blur, `within_1px` and the other scores of depth, with dots for what is nested, `bound_px`.
 """
 
 import json
@@ -181,7 +181,8 @@ def _of_planes(row: Row) -> Iterable[Row]:
     records: dict[float, Row] = {}
     for plane in row["planes"]:
         record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
-        scores = {name: plane[name] for name in plane if name not in ("z_mm", "object", "truth")}
+        words = ("z_mm", "object", "truth")
+        scores = dict(_leaves({name: value for name, value in plane.items() if name not in words}))
         if plane["truth"] == "object":
             record |= {"objects": plane["object"]} | scores
         else:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.evaluation.rows import NO_MEASURES
+from pcii.evaluation.rows import HEAD, NO_MEASURES
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -24,12 +24,19 @@ MIN_SCENES = 2
 """One scene has no spread over scenes."""
 CELL = ("scene", "light", "method")
 SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
-SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage"}
-SHARES |= {"badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
-SHARES |= {"ece", "share", "confidence", "correct"}
-SIGNED = {"bias_mm", "bias_px"}
-SIGNS = {"iou": 1, "bad_1px": -1}
-"""What methods of removal and of depth are compared by, and the sign that makes more better."""
+SHARES |= {"claimed_share", "false_share", "within_1px", "within_3px", "bad_1px", "bad_3px", "coverage"}
+SHARES |= {"badpix_007", "brier", "ece", "share", "confidence", "correct"}
+MORE_IS_BETTER = ("iou", "pixel_iou", "within_1px", "within_3px", "quadratic_score")
+"""What methods are compared by."""
+SIGNED = {"bias_mm", "bias_px", "quadratic_score"}
+
+
+NOTHING = "(nothing)"
+YARDSTICKS = {"everything": "(everything)", "one_depth": "(one depth)"}
+"""Prefixes of columns with the scores of a yardstick, which looks at no photon, and its name among methods.
+
+One claims everything at every plane, the other answers the one depth that is right for most pixels; `NOTHING`
+claims nothing and answers nowhere."""
 
 
 class Mean(NamedTuple):
@@ -120,6 +127,24 @@ def lines_of(table: "DataFrame") -> list[Any]:
     return list(table.itertuples())
 
 
+def with_yardsticks(frame: "DataFrame") -> "DataFrame":
+    """The frame with rows of `YARDSTICKS` and `NOTHING`, in place of the columns with their scores."""
+    import pandas as pd
+
+    keys = [name for name in HEAD if name != "method"] + ["photons_per_view"]
+    names = {
+        prefix: {name: name.replace(f"{prefix}.", "") for name in frame if f"{prefix}." in name}
+        for prefix in YARDSTICKS
+    }
+    parts = [frame.drop(columns=[name for own in names.values() for name in own])]
+    for prefix, own in names.items():
+        known = frame[[*keys, *own]].dropna(how="all", subset=[*own])
+        known = known.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=own)
+        zeros = known[[*own.values()]] * 0.0
+        parts += [known.assign(method=YARDSTICKS[prefix]), known.assign(**zeros, method=NOTHING)]
+    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+
+
 def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
     """Mean of every measure over datasets, each the mean over its planes that have it.
 
@@ -175,9 +200,13 @@ def ranks(frame: "DataFrame", measure: str, over: str = "scene") -> "DataFrame":
     other scenes say how far a result holds. With `over` = "identity" each dataset counts, as for one scene.
     Columns: `light`, `method`, `rank` (equal methods share one), `n` scenes (or datasets), `mean` with its
     interval from `low` to `high`; of the difference to the best method on the same scenes `difference`,
-    `difference_low`, `difference_high`, `p` (see `sign_flip_p`) and `least_p`.
+    `difference_low`, `difference_high`, `p` (see `sign_flip_p`) and `least_p`. Raises `InputError` for a
+    measure that is not among `MORE_IS_BETTER`.
     """
     import pandas as pd
+
+    if measure not in MORE_IS_BETTER:
+        raise InputError(f"measure: methods are ranked by {', '.join(MORE_IS_BETTER)}, got {measure!r}")
 
     tables = [pd.DataFrame(columns=["light", "method"])]
     known = frame[frame[measure].notna()] if measure in frame else frame[:0]
@@ -188,7 +217,7 @@ def ranks(frame: "DataFrame", measure: str, over: str = "scene") -> "DataFrame":
         if not len(values) or (over == "scene" and len(values) < MIN_SCENES):
             continue
         x = values.to_numpy().T.copy()
-        score = SIGNS[measure] * x.mean(axis=-1)
+        score = x.mean(axis=-1)
         order = np.argsort(-score, kind="stable")
         x = x[order]
         table = pd.DataFrame({"light": light, "method": values.columns[order]})

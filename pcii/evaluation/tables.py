@@ -7,33 +7,40 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base.plain_text import in_markdown
-from pcii.evaluation.summary import SIGNS, lines_of, ranks
+from pcii.evaluation.method_names import depth_name
+from pcii.evaluation.summary import MORE_IS_BETTER, NOTHING, YARDSTICKS, lines_of, ranks
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame, Series
 
-TITLES = {"iou": "IoU", "bad_1px": "Errors of depth above 1 px"}
-"""What methods of removal and of depth are compared by."""
+TITLES = {"iou": "IoU", "within_1px": "Share of depths within 1 px"}
+"""What methods of removal and of depth are compared by, more being better."""
+SWEEPS = ("sweep-9", "sweep-17", "sweep-33", "variance-sweep")
+SIMPLE = (NOTHING, *YARDSTICKS.values(), *map(depth_name, SWEEPS))
+"""What any method should beat."""
+NOT_BETTER = "†"
+"""Mark of a mean that is no better than the best of `SIMPLE` for the same scene and light."""
 REMOVAL = {
     "iou": "IoU",
     "pixel_iou": "IoU, pixels",
-    "pixel_iou_oracle": "oracle IoU, pixels",
     "boundary_f": "boundary F",
-    "claimed_share": "claimed share",
+    "false_share": "claimed falsely",
     "photon_precision": "photon precision",
     "photon_recall": "photon recall",
     "seconds": "seconds",
 }
 """Measures of removal in tables, and the names of their columns."""
 DEPTH = {
+    "within_1px": "within 1 px",
+    "within_3px": "within 3 px",
+    "coverage": "answered",
+    "quadratic_score": "quadratic score",
+    "brier": "Brier",
     "median_px": "median, px",
     "bound_px": "bound, px",
     "bias_px": "bias, px",
-    "bad_1px": "bad_1px",
-    "bad_3px": "bad_3px",
     "hci_objects.badpix_007": "BadPix(0.07)",
     "hci.badpix_007": "BadPix(0.07), all pixels",
-    "coverage": "answered",
     "ece": "ECE",
     "seconds": "seconds",
 }
@@ -89,7 +96,7 @@ def light_name(light: float | str) -> str:
 def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
     """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
 
-    `of_cells` are the means of `frame` by scene, light and method.
+    `frame` is of `summary.with_yardsticks`, `of_cells` its means by scene, light and method.
     """
     scenes = frame["scene"].nunique()
     over = "scene" if scenes > 1 else "identity"
@@ -101,7 +108,7 @@ def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
         if len(ranked):
             unit = "scenes" if over == "scene" else "datasets"
             yield rank_table(ranked, f"{title}, methods compared on the same {unit}", unit)
-        yield mean_table(f"{title} by photon budget", means, ["scene", "method"], "light", light_name)
+        yield mean_table(f"{title} by photons per view", means, ["scene", "method"], "light", light_name)
         if scenes <= MAX_DETAILED_SCENES:
             yield _measure_table(f"{title} beside other measures", of_cells, means, names)
 
@@ -128,19 +135,27 @@ def mean_table(
 ) -> Table:
     """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
 
-    The best method of a scene (if rows are of scenes), light and measure stands out, where another is worse;
-    `bound` names what is no method. Where a mean is of fewer than `full_n` values their number is said.
+    Of `MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where another
+    is worse, and `NOT_BETTER` marks methods that are no better than the best of `SIMPLE`; `bound`
+    names what is no method. Where a mean is of fewer than `full_n` values their number is said.
     """
     if not len(means):
         return Table(title, (), ())
     contest = [key for key in ("scene", "light", "measure") if key in means]
-    values = means["mean"] * means["measure"].astype(object).map(SIGNS).astype(float)
-    values = values.mask(means["method"].astype(object) == bound)
-    groups = values.groupby([means[key] for key in contest], observed=True)
-    is_best = (values == groups.transform("max")) & (values > groups.transform("min"))
+    methods = means["method"].astype(object)
+    is_simple = methods.isin(SIMPLE)
+    values = means["mean"].where(means["measure"].isin(MORE_IS_BETTER) & (methods != bound))
+
+    def best_of(some: "Series") -> "Series":
+        return some.groupby([means[key] for key in contest], observed=True).transform("max")
+
+    is_best = (values == best_of(values)) & (values > -best_of(-values))
+    is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
     texts = [
-        with_interval(row.mean, row.low, row.high) + (f" of {row.n}" if row.n < full_n else "")
-        for row in lines_of(means[["mean", "low", "high", "n"]])
+        with_interval(row.mean, row.low, row.high)
+        + (f" of {row.n}" if row.n < full_n else "")
+        + (f" {NOT_BETTER}" if row.is_marked else "")
+        for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_marked=is_marked))
     ]
     cells = means.assign(text=texts, is_best=is_best)
     cells = cells.pivot(index=list(rows), columns=column, values=["text", "is_best"])

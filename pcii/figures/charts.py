@@ -71,7 +71,7 @@ def accuracy_chart(
             handles[plot_label(method)] = axes.errorbar(own[place], own["mean"], yerr=bars, **style)
         axes.set_xlabel(places[place])
         if is_share:
-            axes.set_ylim(-0.02, 1.02)
+            axes.set_ylim(min(-0.02, rows["low"].min()), 1.02)
         else:
             axes.set_yscale("log")
         quiet_grid(axes)

@@ -1,4 +1,4 @@
-"""Bounds on accuracy: masks from the true depth, and the Cramér-Rao bound on depth from photons.
+"""The Cramér-Rao bound on depth from photons.
 
 Notation: u total disparity in px; g gradient of the logarithm of the rate, per px; N photons; the
 rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k), where a_l = (l - (L-1)/2)
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus, intersection_over_union
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, TrueFocus
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.geometry import blur_half_extent_px, parallax_px, total_disparity_px
 from pcii.types.section_stack import Sections
@@ -71,20 +71,10 @@ def log_gradient_squared(
     return float((per_rate * across**2).sum() / light), float((per_rate * down**2).sum() / light)
 
 
-def plane_bounds(true: TrueFocus) -> dict[tuple[int, Kind], float]:
-    """IoU of `TrueFocus.oracle` at each plane, by the plane's number and kind of truth."""
-    oracle = {kind: true.oracle(kind) for kind in KINDS}
-    return {
-        (plane, kind): intersection_over_union(oracle[kind][plane], true.masks(kind)[plane])
-        for plane in range(len(true.planes))
-        for kind in KINDS
-    }
-
-
 def object_bounds(
     truth: Truth, full_light: Sections | None, sections: Sections | None
 ) -> list[dict[str, Any]]:
-    """For each object its photons, its texture and the bound on its depth that follows from them.
+    """For each object that is scored its photons, its texture, and the bound on its depth by both.
 
     The texture is that of the full-light section at the object's plane, where the object is in focus there
     and away from its edges. Photons are counted by origin if the truth has it, else in the object's pixels of
@@ -94,7 +84,7 @@ def object_bounds(
     planes, lit_planes = (
         {} if each is None else TrueFocus(each.planes, truth).plane_of for each in (sections, full_light)
     )
-    for number, name in sorted(truth.names.items()):
+    for number in sorted(set(truth.names) - truth.unscored):
         photons = _photons(number, truth, sections, planes.get(number))
         gradient = None if full_light is None else _texture(number, truth, full_light, lit_planes.get(number))
         sigma = None
@@ -102,7 +92,7 @@ def object_bounds(
             sigma = depth_bound_px(full_light.grid, photons, gradient)
         rows.append(
             {
-                "name": name,
+                "name": truth.names[number],
                 "photons": photons,
                 "log_gradient_per_px": None if gradient is None else float(np.sqrt(sum(gradient))),
                 "depth_sigma_px": sigma,

@@ -8,7 +8,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.imaging.mask_outlines import object_share
-from pcii.metrics.bounds import object_bounds, plane_bounds
+from pcii.metrics.bounds import object_bounds
 from pcii.metrics.depth_accuracy import depth_errors
 from pcii.metrics.true_masks import KINDS, TrueFocus, mask_agreement, photon_agreement
 from pcii.sections.photon_statistics import (
@@ -35,15 +35,16 @@ def score(
 ) -> Score:
     """Compare in-focus masks and a depth map with the truth.
 
-    `planes` has a row for each method, plane and kind of truth. "object": the objects whose visible surface
-    is closest to this plane. "pixel": the points whose blur half-extent,
-    `|disparity(z) - disparity(z0)| (N - 1) / 2`, is at most 1 px. `boundary_f` is the F-measure of the
-    outlines with a tolerance of 2 px, located within pixels if the truth has `coverage`; `entropy_before` and
-    `entropy_after` are Eq. 9 of the section as a whole, before and after removal, in bits; `claimed_share` is
-    the share of the section that the mask keeps. `objects` is Table 1: the entropy at each plane of each
-    object's region, which includes its blur at the other planes. `depth` is `depth_errors`. `bounds` holds
-    limits of accuracy: `iou_oracle` for each row of `planes`, and `depth_sigma_px` for each object, from its
-    texture in `full_light`, the sections of the radiance (Eq. 2). `readout` has the frames of the counts.
+    `planes` has a row for each method, plane and kind of truth. "object": the objects that belong to this
+    plane (`TrueFocus.plane_of`). "pixel": the points whose blur half-extent,
+    `|disparity(z) - disparity(z0)| (N - 1) / 2`, is at most 1 px. `mask_agreement` says how masks are
+    compared, with outlines of a tolerance of 2 px, located within pixels if the truth has `coverage`;
+    `entropy_before` and `entropy_after` are Eq. 9 of the section as a whole, before and after removal, in
+    bits; `claimed_share` is the share of the section that the mask keeps. `objects` is Table 1: the entropy
+    at each plane of the region of each object that is scored, which includes its blur at the other planes.
+    `depth` is `depth_errors`. `bounds` holds `depth_sigma_px` for each object, the least standard deviation
+    of its depth, from its texture in `full_light`, the sections of the radiance (Eq. 2). `readout` has the
+    frames of the counts.
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.
@@ -73,23 +74,20 @@ def score(
         if depth is not None and grid is None:
             raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
     rows: list[dict[str, Any]] = []
-    bounds: dict[str, Any] = {"planes": [], "objects": []}
     objects: list[dict[str, Any]] = []
     # Methods usually share their sections: what follows from these and the truth alone is computed once.
     for sections in {id(each.sections): each.sections for each in methods}.values():
         pooled = pooled_estimate(sections, section_window_px(sections))
         true = None if truth is None else TrueFocus(sections.planes, truth)
-        oracle_iou = {} if true is None else plane_bounds(true)
         if truth is not None and sections is methods[0].sections:
             objects = _object_rows(sections, pooled, truth)
         for each in methods:
             if each.sections is sections:
                 rows += _plane_rows(each, pooled, true)
-                for (plane, kind), iou in oracle_iou.items():
-                    row = {"z_mm": float(each.z_mm[plane]), "method": each.method, "truth": kind}
-                    bounds["planes"].append({**row, "iou_oracle": iou})
+    of_objects: list[dict[str, Any]] = []
     if truth is not None:
-        bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
+        of_objects = object_bounds(truth, full_light, methods[0].sections if methods else None)
+    bounds = {"objects": of_objects}
     readout = asdict(methods[0].sections.readout) if methods else None
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
@@ -101,17 +99,18 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
         photons = photon_agreement(focus, true, plane)
         for kind in KINDS:
             names = [] if true is None or kind == "pixel" else true.names_at(plane)
-            mask = share = None
+            mask = share = is_free = None
             if true is not None:
-                mask, coverage = true.masks(kind)[plane], true.truth.coverage
-                share = None if coverage is None else object_share(mask, true.truth.object_id, coverage)
+                mask, coverage, ids = true.masks(kind)[plane], true.truth.coverage, true.truth.object_id
+                share = None if coverage is None else object_share(mask, ids, coverage)
+                is_free = true.is_free(kind, ids, true.blur_px[plane])
             rows.append(
                 {
                     "z_mm": float(depth),
                     "method": focus.method,
                     "object": ", ".join(names) or None,
                     "truth": kind,
-                    **mask_agreement(focus.in_focus[plane], mask, share),
+                    **mask_agreement(focus.in_focus[plane], mask, share, is_free),
                     **photons[kind],
                     "entropy_before": before[plane],
                     "entropy_after": after[plane],
@@ -136,13 +135,13 @@ def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float
 def _object_rows(sections: Sections, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
     maxima = pooled.max(axis=1).max(axis=(0, 1))
     rows: list[dict[str, Any]] = []
-    for number, name in sorted(truth.names.items()):
+    for number in sorted(set(truth.names) - truth.unscored):
         region = entropy_region(sections.grid, truth, number, sections.z_mm)
         entropy: dict[str, float | None] = {f"{z:g}": None for z in sections.z_mm}
         if region.any():
             for z, plane in zip(sections.z_mm, pooled, strict=True):
                 entropy[f"{z:g}"] = region_entropy_bits(plane, region, maxima)
-        rows.append({"name": name, "entropy": entropy})
+        rows.append({"name": truth.names[number], "entropy": entropy})
     return rows
 
 

@@ -183,7 +183,8 @@ class Dataset(ShortForm):
         arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
         photons = self._photon_truth()
         try:
-            return Truth(**arrays, names=self.manifest.objects, photons=photons)
+            unscored = frozenset(self.manifest.unscored)
+            return Truth(**arrays, names=self.manifest.objects, photons=photons, unscored=unscored)
         except InputError as fault:
             raise InputError(f"{self.path / TRUTH}: {fault}") from None
 

@@ -59,7 +59,8 @@ def save_dataset(
     images come from) are shown in reports.
 
     The folder, which must be new or empty, is complete or is not there. Its identity is a hash of the content
-    of its files, the grid and the objects' names. Raises `InputError` for parts that do not belong together.
+    of its files, the grid, and the objects' names and which of them count in no score. Raises `InputError`
+    for parts that do not belong together.
 
     >>> from tempfile import TemporaryDirectory
     >>> from pcii.types.camera_grid import CameraGrid
@@ -205,4 +206,6 @@ def _content(
     }
     if counts is not None and not counts.readout.is_plain:
         content |= asdict(counts.readout)
+    if truth is not None and truth.unscored:
+        content["unscored"] = sorted(truth.unscored)
     return {"identity": hash_json(content), **content}

@@ -122,6 +122,7 @@ class DatasetManifest(Manifest):
     radiance_channels: Literal[1, 3] | None = None
     radiance_unit: Text | None = None
     objects: dict[ObjectId, Text] = {}
+    unscored: list[ObjectId] = []
     analysis: Analysis | None = None
     photon_budget: Photons | None = None
     recipe: Recipe = {}

@@ -34,6 +34,7 @@ class Truth(Drawn):
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
     backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
+    `unscored` are the numbers of objects that count in no score.
 
     The other maps are None where the dataset lacks them. `normal` (H, W, 3) float32: unit normal of the
     surface in world axes, towards the camera; 0 where nothing is hit. `coverage` (H, W) float32: the share
@@ -48,6 +49,7 @@ class Truth(Drawn):
     normal: np.ndarray | None = None
     coverage: np.ndarray | None = None
     visible_views: np.ndarray | None = None
+    unscored: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
@@ -57,6 +59,8 @@ class Truth(Drawn):
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
         if unknown:
             raise InputError(f"object_id: id {min(unknown)} has no name")
+        if nameless := set(self.unscored) - set(self.names):
+            raise InputError(f"unscored: there is no object with the number {min(nameless)}")
         shape = self.z_mm.shape
         _check_map("normal", self.normal, (*shape, 3), np.float32, -1, 1)
         _check_map("coverage", self.coverage, shape, np.float32, 0, 1)
@@ -77,9 +81,17 @@ class Truth(Drawn):
         return bool((self.object_id > 0).any())
 
     @property
+    def is_unscored(self) -> np.ndarray:
+        """Pixels (H, W) bool of the objects that count in no score."""
+        return np.isin(self.object_id, [*self.unscored])
+
+    @property
     def object_z_mm(self) -> np.ndarray:
-        """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
-        return np.where(self.object_id > 0, self.z_mm, np.inf) if self.has_objects else self.z_mm
+        """Depth of the objects that are scored (H, W) in mm, +inf elsewhere; of everything, if no object is
+        known."""
+        if not self.has_objects:
+            return self.z_mm
+        return np.where((self.object_id > 0) & ~self.is_unscored, self.z_mm, np.inf)
 
 
 def _check_map(

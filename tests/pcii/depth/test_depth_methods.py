@@ -17,7 +17,7 @@ TRUE_PX = 4.3
 METHODS = [
     ("posterior", "counts", 0.35),
     ("focus", "counts", 0.5),
-    ("likelihood-sweep", "counts", 0.35),
+    ("sweep-17", "counts", 0.35),
     ("variance-sweep", "counts", 0.35),
     # Whole shifts of radiance are up to half a pixel off.
     ("posterior", "views", 0.5),
@@ -86,7 +86,7 @@ def test_cameras_in_the_wrong_order_do_not_pass(method: str, kind: str, most_px:
     assert not np.median(error_px) < most_px  # or it is not answered
 
 
-@pytest.mark.parametrize("method", ["likelihood-sweep", "variance-sweep"])
+@pytest.mark.parametrize("method", ["sweep-17", "variance-sweep"])
 def test_brightness_alone_is_no_depth(method: str) -> None:
     # A mosaic whose colours differ much: where all shifts are even a voxel has samples of one colour only.
     grid = unit_grid(5, 5, 48, 48)
@@ -122,7 +122,7 @@ def test_the_default_follows_the_data() -> None:
     ("method", "sentence"),
     [
         ("structure-tensor", "no estimator of depth from photon counts named 'structure-tensor'"),
-        ("nearest", "named 'nearest'; use posterior, focus, likelihood-sweep, variance-sweep$"),
+        ("nearest", "named 'nearest'; use posterior, focus, sweep-9, sweep-17, sweep-33, variance-sweep$"),
     ],
 )
 def test_a_method_that_cannot_take_the_data_is_refused(method: str, sentence: str) -> None:
@@ -191,4 +191,4 @@ def test_too_many_photons_for_the_likelihood_sweep_are_refused() -> None:
     grid = unit_grid(2, 2, 8, 8)
     bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 2**20 + 1), grid)
     with pytest.raises(pcii.InputError, match=r"more than 2\^40 photons"):
-        estimate_depth(bright, (0.5, 1.0), method="likelihood-sweep")
+        estimate_depth(bright, (0.5, 1.0), method="sweep-17")

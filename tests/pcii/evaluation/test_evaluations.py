@@ -84,6 +84,7 @@ def test_every_figure_by_hand(evaluated: Evaluation) -> None:
     own: Any = frame[is_own].set_index(["z_mm", "seed"])
     assert own.loc[1.0, "iou"].to_dict() == {3: 0.6, 4: 0.8, 5: 0.7}
     assert own.loc[2.0, "iou"].to_dict() == {3: 1.0, 4: 1.0, 5: 1.0}
+    assert own.loc[2.0, "false_share"].tolist() == [0.0] * 3
     assert own.loc[1.0, "objects"].tolist() == ["near"] * 3
     assert own["photon_recall"].isna().all()  # these photons have no known origin
     # Over both planes 0.8, 0.9, 0.85: half width 4.302653 * 0.05 / sqrt(3) = 0.124207.
@@ -93,8 +94,9 @@ def test_every_figure_by_hand(evaluated: Evaluation) -> None:
     # Of 24 pixels the near object is 10, the far one 0, in every dataset.
     assert mean_of(evaluated, OWN, "two rows", "iou").mean == pytest.approx(10 / 24 / 2)
     assert mean_of(evaluated, OWN, "two rows", "claimed_share")[-4:] == (3, 0.25, 0.25, 0.25)
-    # Each object is flat and at its plane, so who knows the depths makes no mistake.
-    assert mean_of(evaluated, OWN, "two rows", "pixel_iou_oracle").mean == 1.0
+    # Of 96 pixels each object is ten.
+    assert mean_of(evaluated, OWN, "(everything)", "iou").mean == pytest.approx(10 / 96)
+    assert mean_of(evaluated, OWN, "(nothing)", "iou").mean == 0.0
     # 96 photons in the last view and 20 + 6, 8, 7 in the first, of four views.
     photons = mean_of(evaluated, OWN, "by count", "photons_per_view")
     assert photons.mean == pytest.approx((96 + 20 + 7) / 4)
@@ -152,7 +154,10 @@ def test_a_depth_map_without_estimates_is_reported_as_such(
     assert frame[["ece", "mae_mm"]].isna().all(axis=None)
     assert frame["coverage"].tolist() == [0.0] * 3
     assert frame["bad_1px"].tolist() == [1.0] * 3
-    assert "Errors of depth above 1 px by photon budget" in (tmp_path / "out" / "evaluation.html").read_text()
+    assert (
+        "Share of depths within 1 px by photons per view"
+        in (tmp_path / "out" / "evaluation.html").read_text()
+    )
 
 
 def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, calls: list[str]) -> None:
@@ -186,7 +191,7 @@ def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path:
     evaluation = evaluate([series], tmp_path / "alone", **asked)
     assert mean_of(evaluation, OWN, "by_count", "iou").mean == pytest.approx(0.85)
     assert mean_of(evaluation, OWN, "rows", "iou").mean == pytest.approx(10 / 48)
-    assert mean_of(evaluation, OWN, "depth:near", "bad_1px").mean == 0.5
+    assert mean_of(evaluation, OWN, "depth:near", "within_1px").mean == 0.5
     shared = evaluate([series], tmp_path / "out", **asked, executor=Executor(2))
     check_same_but_for_seconds(shared, evaluation)
     # Nobody knows what they follow from, so they are measured whenever they are named.

@@ -102,7 +102,7 @@ def rows_of(name: str) -> list[dict[str, Any]]:
     """Two groups that share this title; more photons are worse."""
     head = {"dataset": name, "title": name, "photons_per_view": 1.0, "seconds": 1.0}
     reliability = {"0.9-1.0": {"share": 1.0, "confidence": 1.0, "correct": 0.5}}
-    depth = {"depth": {"bad_1px": 0.5, "ece": 0.5, "reliability": reliability}}
+    depth = {"depth": {"within_1px": 0.5, "ece": 0.5, "reliability": reliability}}
     removal = [
         head
         | {"recipe": f"{scene}{name}", "scene": scene, "settings": {"scene": scene, "x": 1}}
@@ -158,7 +158,7 @@ def test_a_page_of_200_scenes_is_small_and_in_their_order(tmp_path: Path) -> Non
     rows = [
         {"dataset": "d", "identity": f"{scene} {seed}", "seed": seed, "recipe": str(scene), "seconds": 1.0}
         | {"title": f"scene {scene}", "budget": light, "method": f"depth:{letter}", "photons_per_view": 1.0}
-        | {"depth": {"bad_1px": (scene + seed + number) / 210}}
+        | {"depth": {"within_1px": (scene + seed + number) / 210}}
         for scene in range(200)[::-1]
         for seed in (1, 2)
         for light in (30.0, 100.0, 300.0, 1000.0, "full-light")

@@ -64,7 +64,7 @@ def test_maps_made_elsewhere_score_as_the_method_that_made_them(
         one, other = (table.sort_values(keys, ignore_index=True) for table in (run, own))
         assert one["dataset"].tolist() == other["dataset"].tolist()
         assert set(one["scene"]) == {"pair", "pair, binary frames"}
-        columns = [*keys, "iou" if method == "variance" else "bad_1px", "photons_per_view"]
+        columns = [*keys, "iou" if method == "variance" else "within_1px", "photons_per_view"]
         pd.testing.assert_frame_equal(one[columns], other[columns], check_categorical=False)
         assert other["seconds"].isna().all()
     assert own["light"].cat.categories.tolist() == [30.0, 1000.0, 3000.0, "full-light"]

@@ -17,6 +17,7 @@ from pcii.evaluation.summary import (
     means_over_scenes,
     ranks,
     sign_flip_p,
+    with_yardsticks,
 )
 
 
@@ -103,46 +104,77 @@ def test_many_signs_are_drawn_and_agree_with_all_of_them() -> None:
 A, B = "depth:a", "depth:b"
 
 
-def row(scene: str, seed: int, method: str, bad_1px: float, **depth: Any) -> dict[str, Any]:
+def row(scene: str, seed: int, method: str, within_1px: float, **depth: Any) -> dict[str, Any]:
     head = {"dataset": f"seed_{seed}", "identity": f"{scene} {seed}", "seed": seed, "seconds": 1.0}
     head |= {"recipe": scene, "title": scene, "budget": 30.0, "photons_per_view": 30.0}
-    return head | {"method": method, "depth": {"bad_1px": bad_1px, **depth}}
+    return head | {"method": method, "depth": {"within_1px": within_1px, **depth}}
 
 
 BY_HAND = [
-    row("cards", 1, A, 0.25),
-    row("cards", 2, A, 0.75),
+    row("cards", 1, A, 0.75),
+    row("cards", 2, A, 0.25),
     row("cards", 1, B, 0.5),
-    row("cards", 2, B, 1.0),
-    row("slats", 1, A, 0.25),
-    row("slats", 1, B, 0.75),
-    row("slats", 2, B, 0.0),  # datasets that the other method has not seen
-    row("slats", 3, A, 1.0),
-    row("alone", 1, B, 0.0),  # and a scene
+    row("cards", 2, B, 0.0),
+    row("slats", 1, A, 0.75),
+    row("slats", 1, B, 0.25),
+    row("slats", 2, B, 1.0),  # datasets that the other method has not seen
+    row("slats", 3, A, 0.0),
+    row("alone", 1, B, 1.0),  # and a scene
 ]
 
 
 def test_each_scene_counts_once_with_the_seeds_that_all_methods_have() -> None:
-    first, second = ranks(frame_of(BY_HAND), "bad_1px").to_dict("records")
-    # a: 0.5 and 0.25; b: 0.75 twice, so it is worse by 0.25 and 0.5, with 12.706 * 0.125 to either side.
-    assert (first["light"], first["method"], first["rank"], first["n"], first["mean"]) == (30, A, 1, 2, 0.375)
+    first, second = ranks(frame_of(BY_HAND), "within_1px").to_dict("records")
+    # a: 0.5 and 0.75; b: 0.25 twice, so it is worse by 0.25 and 0.5, with 12.706 * 0.125 to either side.
+    assert (first["light"], first["method"], first["rank"], first["n"], first["mean"]) == (30, A, 1, 2, 0.625)
     assert np.isnan([first["difference"], first["p"]]).all()
-    assert (second["method"], second["rank"], second["mean"]) == (B, 2, 0.75)
-    assert (second["low"], second["high"]) == (0.75, 0.75)
+    assert (second["method"], second["rank"], second["mean"]) == (B, 2, 0.25)
+    assert (second["low"], second["high"]) == (0.25, 0.25)
     ends = [second[name] for name in ("difference", "difference_low", "difference_high")]
-    assert ends == pytest.approx([0.375, 0.375 - 1.588, 0.375 + 1.588], abs=1e-3)
+    assert ends == pytest.approx([-0.375, -0.375 - 1.588, -0.375 + 1.588], abs=1e-3)
     assert second["p"] == second["least_p"] == 0.5
 
 
+def test_yardsticks_stand_beside_methods_and_measures_of_which_less_is_better_do_not_rank() -> None:
+    one_depth = {"within_1px": 0.5, "within_3px": 0.75, "quadratic_score": 0.25}
+    rows = [row(scene, 1, method, 0.4, one_depth=one_depth) for scene in "xy" for method in (A, B)]
+    planes = [
+        {
+            "z_mm": z,
+            "object": None,
+            "truth": truth,
+            "iou": iou,
+            "everything": {"iou": iou, "false_share": 0.5},
+        }
+        for z, iou in ((1.0, 0.25), (2.0, None))
+        for truth in ("object", "pixel")
+    ]
+    rows.append(
+        {name: value for name, value in rows[0].items() if name != "depth"}
+        | {"method": "c", "planes": planes}
+    )
+    frame = with_yardsticks(frame_of(rows))
+    assert not [name for name in frame if "everything" in name or "one_depth" in name]
+    of = means(frame, ["scene", "method"]).set_index(["scene", "method", "measure"])["mean"]
+    assert of["x", "(one depth)", "within_1px"] == 0.5
+    assert of["x", "(nothing)", "within_3px"] == of["x", "(nothing)", "pixel_iou"] == 0.0
+    assert (of["x", "(everything)", "iou"], of["x", "(everything)", "false_share"]) == (0.25, 0.5)
+    assert ("y", "(everything)", "iou") not in of
+    ranked = ranks(frame, "within_1px")
+    assert ranked["method"].tolist() == ["(one depth)", A, B, "(nothing)"]
+    with pytest.raises(InputError, match=r"^measure: methods are ranked by iou, .*, got 'bad_1px'"):
+        ranks(frame, "bad_1px")
+
+
 def test_one_method_over_many_scenes_has_one_mean_and_equal_methods_share_a_rank() -> None:
-    (alone,) = ranks(frame_of([row(str(n), 1, A, n / 4) for n in range(4)]), "bad_1px").to_dict("records")
+    (alone,) = ranks(frame_of([row(str(n), 1, A, n / 4) for n in range(4)]), "within_1px").to_dict("records")
     # Deviation 0.3227: 3.18245 * 0.3227 / 2 = 0.5136, and no share is below 0.
     found = [alone[name] for name in ("n", "mean", "low", "high")]
     assert found == pytest.approx([4, 0.375, 0, 0.8886], abs=1e-4)
     equal = frame_of([row(scene, 1, method, 0.5) for scene in ("cards", "slats") for method in (A, B)])
-    assert ranks(equal, "bad_1px")["rank"].tolist() == [1, 1]
-    assert not len(ranks(frame_of(BY_HAND[:4]), "bad_1px"))  # one scene has no spread over scenes
-    assert ranks(frame_of(BY_HAND[:4]), "bad_1px", "identity")["mean"].tolist() == [0.5, 0.75]
+    assert ranks(equal, "within_1px")["rank"].tolist() == [1, 1]
+    assert not len(ranks(frame_of(BY_HAND[:4]), "within_1px"))  # one scene has no spread over scenes
+    assert ranks(frame_of(BY_HAND[:4]), "within_1px", "identity")["mean"].tolist() == [0.5, 0.25]
 
 
 def test_means_are_over_the_seeds_that_have_a_value() -> None:
@@ -156,7 +188,7 @@ def test_means_are_over_the_seeds_that_have_a_value() -> None:
         row("t", 4, A, 0.5, ece=0.5, reliability=bins(0.0, None, None)),
     ]
     table = means(frame_of(rows)).set_index("measure")
-    expected = {"ece": (3, 0.5), "bad_1px": (4, 0.5)}
+    expected = {"ece": (3, 0.5), "within_1px": (4, 0.5)}
     expected |= {"reliability.0.9-1.0.share": (3, 0.5), "reliability.0.9-1.0.confidence": (2, 0.94)}
     for measure, (n, mean) in expected.items():
         assert (table.at[measure, "n"], table.at[measure, "mean"]) == (n, pytest.approx(mean))
@@ -164,6 +196,9 @@ def test_means_are_over_the_seeds_that_have_a_value() -> None:
 
 def test_scenes_count_once_in_means_over_scenes() -> None:
     rows = [row("cards", 1, A, 0.25), row("cards", 2, A, 0.75), row("slats", 1, A, 0.25)]
-    table = means_over_scenes(means(frame_of(rows)), {"bad_1px": "geometric"}).set_index("measure")
-    assert (table.at["bad_1px", "n"], table.at["bad_1px", "mean"]) == (2, pytest.approx(np.sqrt(0.5 * 0.25)))
+    table = means_over_scenes(means(frame_of(rows)), {"within_1px": "geometric"}).set_index("measure")
+    assert (table.at["within_1px", "n"], table.at["within_1px", "mean"]) == (
+        2,
+        pytest.approx(np.sqrt(0.5 * 0.25)),
+    )
     assert table.at["seconds", "mean"] == 1.0

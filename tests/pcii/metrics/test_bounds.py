@@ -1,49 +1,14 @@
-"""What a method that knows the depth would score, and the bound on depth against a numerical one."""
+"""The bound on depth against a numerical one."""
 
 import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.metrics.bounds import (
-    depth_bound_px,
-    log_gradient_squared,
-    object_bounds,
-    plane_bounds,
-)
-from pcii.metrics.true_masks import TrueFocus
+from pcii.metrics.bounds import depth_bound_px, log_gradient_squared, object_bounds
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 from pcii.types.truth import PhotonTruth, Truth
-
-GRID = unit_grid(5, 5, 1, 8)  # total disparity 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
-Z = np.array([4 / 40, 4 / 30])
-
-
-def truth() -> Truth:
-    """Eight pixels in a row: two of object 1, four of object 2, backdrop in focus, nothing."""
-    total_px = np.array([[40.0, 36.0, 34.0, 30.0, 28.0, 20.0, 31.0, np.nan]])
-    z = np.where(np.isnan(total_px), np.inf, 4 / np.nan_to_num(total_px, nan=1.0))
-    return Truth(z, np.array([[1, 1, 2, 2, 2, 2, 0, 0]]), {1: "near", 2: "far"})
-
-
-def test_the_oracle_claims_what_a_method_that_knows_the_depth_could() -> None:
-    true = TrueFocus(FocalPlanes.at_depths(GRID, Z), truth())
-    # Blur of half the difference: 40 is in focus at 40; 30, 28 (1 px) and 31 at 30; 36 and 34 nowhere.
-    by_pixel = [[1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 0, 1, 0]]
-    assert true.oracle("pixel")[:, 0].astype(int).tolist() == by_pixel
-    # Every pixel of an object, at its nearest plane.
-    by_object = [[1, 1, 0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 1, 1, 0, 0]]
-    assert true.oracle("object")[:, 0].astype(int).tolist() == by_object
-
-
-def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
-    z = np.array([[4 / 40, 4 / 39, 4 / 38, 4 / 31, np.inf, np.inf, np.inf, np.inf]])
-    true = Truth(z, np.array([[1, 1, 1, 1, 0, 0, 0, 0]]), {1: "long"})
-    iou = plane_bounds(TrueFocus(FocalPlanes.at_depths(GRID, Z), true))
-    # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
-    assert iou == {(0, "object"): 3 / 4, (0, "pixel"): 1.0, (1, "object"): 0.0, (1, "pixel"): 1.0}
 
 
 @pytest.mark.parametrize("grid", [unit_grid(10, 10, 64, 64), unit_grid(4, 6, 64, 64, pitch_mm=(1.0, 2.5))])

@@ -88,6 +88,7 @@ def test_depths_that_cannot_be_are_no_answers() -> None:
         found = depth_errors(GRID, depth, Truth(z, np.ones(z.shape, dtype=int), {1: "wall"}))
         assert found["coverage"] == 0.0
         assert found["bad_3px"] == found["hci"]["badpix_007"] == 1.0
+        assert found["brier"] == found["quadratic_score"] == 0.0
         assert found["mae_mm"] is found["median_px"] is found["bias_px"] is None
 
 
@@ -127,6 +128,35 @@ def test_a_map_that_is_as_often_right_as_it_says_is_calibrated_and_an_overconfid
     over = calibrated(estimate, np.sqrt(stated), true)
     assert over["ece"] == pytest.approx(1 / 6, abs=0.005)
     assert all(one["correct"] < one["confidence"] for one in over["reliability"].values())
+
+
+def test_the_quadratic_score_is_largest_for_the_true_probability_and_missing_answers_are_errors() -> None:
+    """Of 100 pixels 70 are right; confidence is the same everywhere."""
+    truth = Truth(np.full((10, 10), 0.5), np.ones((10, 10), dtype=int), {1: "wall"})
+    z = np.full((10, 10), 0.5)
+    z[:3] = 1.0
+
+    def scored(confidence: float, z_mm: np.ndarray = z) -> dict[str, Any]:
+        return depth_errors(unit_grid(3, 3, 10, 10), DepthMap(z_mm, np.full(z.shape, confidence)), truth)
+
+    scores = {c / 10: scored(c / 10)["quadratic_score"] for c in range(11)}
+    assert max(scores, key=scores.__getitem__) == 0.7
+    assert scores[0.7] == pytest.approx(0.7**2)
+    assert (scores[0.0], scores[1.0]) == (0.0, pytest.approx(0.7 - 0.3))
+    assert scored(0.7)["brier"] == pytest.approx(0.7 * 0.3**2 + 0.3 * 0.7**2)
+    partly = np.where(z == 0.5, z, np.nan)
+    partly[3:6] = np.nan  # 40 answers of 100, all right
+    assert scored(1.0, partly)["quadratic_score"] == 0.4
+    assert (scored(1.0, partly)["median_px"], scored(1.0, z)["median_px"]) == (None, 0.0)
+
+
+def test_the_best_single_depth_is_that_of_most_pixels() -> None:
+    """Total disparities 4 (a fifth), 5.5 to 7 (two fifths) and 20: one depth at 6.25 is right for 0.4."""
+    total_px = np.concatenate([np.full(20, 4.0), np.linspace(5.5, 7.0, 40), np.linspace(20.0, 60.0, 40)])
+    z = 2 / total_px.reshape(10, 10)
+    truth = Truth(z, np.ones(z.shape, dtype=int), {1: "things"})
+    found = depth_errors(unit_grid(3, 3, 10, 10), DepthMap(z, np.ones(z.shape)), truth)["one_depth"]
+    assert found == {"within_1px": 0.4, "within_3px": 0.6, "quadratic_score": pytest.approx(0.16)}
 
 
 @pytest.mark.parametrize("wrong", [-0.1, np.nan])

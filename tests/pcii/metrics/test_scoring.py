@@ -39,15 +39,19 @@ def segmented(masks: np.ndarray) -> Segmented:
 @pytest.mark.parametrize(
     ("claimed", "true", "expected"),
     [
-        (False, False, {"iou": 1.0, "precision": None, "recall": None, "f1": 1.0, "boundary_f": 1.0}),
-        (True, False, {"iou": 0.0, "precision": 0.0, "recall": None, "f1": 0.0, "boundary_f": 0.0}),
-        (False, True, {"iou": 0.0, "precision": None, "recall": 0.0, "f1": 0.0, "boundary_f": 0.0}),
+        (False, False, [None, None, None, None, None, 0.0]),
+        (True, False, [None, 0.0, None, None, None, 1 / 9]),
+        (False, True, [0.0, None, 0.0, 0.0, 0.0, 0.0]),
     ],
 )
-def test_empty_masks_have_defined_answers(claimed: bool, true: bool, expected: dict) -> None:
+def test_empty_masks_have_defined_answers(claimed: bool, true: bool, expected: list[float | None]) -> None:
     square = np.zeros((9, 9), dtype=bool)
     square[3:6, 3:6] = True
-    assert mask_agreement(square & claimed, square & true) == expected
+    found = mask_agreement(square & claimed, square & true)
+    keys = ("iou", "precision", "recall", "f1", "boundary_f", "false_share")
+    assert [found[key] for key in keys] == expected
+    iou, false_share = (1 / 9, 8 / 9) if true else (None, 1.0)
+    assert found["everything"] == {"iou": iou, "false_share": false_share}
 
 
 def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
@@ -66,7 +70,46 @@ def test_a_perfect_answer_scores_one() -> None:
     for key in ("mae_mm", "median_mm", "median_px", "bad_1px", "bad_3px"):
         assert result.depth[key] == 0.0
     assert result.depth["coverage"] == 1.0
-    assert [row["iou_oracle"] for row in result.bounds["planes"]] == [1.0] * 4
+    assert result.depth["quadratic_score"] == 1.0
+    assert {row["false_share"] for row in result.planes} == {0.0}
+
+
+def test_a_floor_belongs_to_no_plane_and_a_table_counts_in_no_score() -> None:
+    """A floor leans through all depths beside the near object, and the far one stands on a table."""
+    base = truth()
+    z, ids = base.z_mm.copy(), base.object_id.copy()
+    z[20:], ids[20:] = np.linspace(480.0, 900.0, 32), 3
+    z[16:18, 18:26], ids[16:18, 18:26] = 620.0, 4
+    names = {1: "near", 2: "far", 3: "floor", 4: "table"}
+    true = TrueFocus(FocalPlanes.at_depths(GRID, Z), Truth(z, ids, names, unscored=frozenset({4})))
+    assert true.plane_of == {1: 0, 2: 1}
+    at_planes = [blur_half_extent_px(GRID, z[20], depth) for depth in Z]
+    far_floor = np.zeros((24, 32), dtype=bool)
+    far_floor[20:, at_planes[1] > 4] = True
+    for free in (ids == 4, (ids == 3) & ~far_floor):  # claimed or not, the scores are the same
+        masks = true.by_object.copy()
+        masks[1] |= free
+        rows = score(segmented(masks), None, true.truth).planes
+        for row in rows[::2]:
+            assert (row["truth"], row["iou"], row["precision"], row["false_share"]) == ("object", 1, 1, 0)
+    masks = true.by_object.copy()
+    masks[1] |= far_floor
+    wrong = score(segmented(masks), None, true.truth).planes[2]
+    assert wrong["iou"] == wrong["precision"] == 64 / (64 + far_floor.sum())
+    assert wrong["false_share"] == far_floor.mean()
+    # By pixel the floor counts where it is in focus, and the table does not.
+    in_focus = at_planes[1] <= 1
+    assert true.by_pixel[1].sum() == 64 + 4 * in_focus.sum() > 64
+    depth = score(None, DepthMap(*depth_of(truth())), true.truth, grid=GRID).depth
+    assert depth["coverage"] == (36 + 64) / (36 + 64 + 4 * 32)
+
+
+def test_who_looks_at_no_photon_scores_as_stated_beside_every_method() -> None:
+    rows = score(segmented(np.ones((2, 24, 32), dtype=bool)), None, truth()).planes
+    for row in rows:
+        assert row["everything"] == {"iou": row["iou"], "false_share": row["false_share"]}
+    nothing = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, truth()).planes
+    assert {(row["iou"], row["false_share"]) for row in nothing} == {(0.0, 0.0)}
 
 
 def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
@@ -84,6 +127,10 @@ def test_depth_errors_are_in_px_of_total_disparity() -> None:
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
     assert result.depth["median_px"] == 0.0
+    assert (result.depth["within_1px"], result.depth["within_3px"]) == (0.64, 0.82)
+    # The far object of 64 of 100 pixels has one depth.
+    best = {"within_1px": 0.64, "within_3px": 0.64, "quadratic_score": pytest.approx(0.64**2)}
+    assert result.depth["one_depth"] == best
 
 
 def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
@@ -103,7 +150,7 @@ def test_without_truth_everything_unknown_is_none() -> None:
     assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)
     assert result.objects == ()
     assert all(set(v.values() if isinstance(v, dict) else [v]) == {None} for v in result.depth.values())
-    assert result.bounds == {"planes": [], "objects": []}
+    assert result.bounds == {"objects": []}
 
 
 def photon_score(kept: list[bool] | None, kind: str = "pixel") -> tuple[float | None, float | None]:
@@ -146,8 +193,8 @@ def test_what_is_said_of_events_goes_before_the_mask() -> None:
     assert photon_score([False, True, True, True]) == (1 / 3, 1 / 4)
     assert photon_score([True, False, True, False]) == (4 / 5, 1.0)
     assert photon_score([False] * 4) == (None, 0.0)
-    # Both objects belong to the only plane.
-    assert photon_score([True, False, True, False], "object") == (1.0, 5 / 6)
+    # The far object does not belong to the only plane.
+    assert photon_score([True, False, True, False], "object") == (4 / 5, 1.0)
 
 
 def test_photons_of_other_events_are_refused() -> None:

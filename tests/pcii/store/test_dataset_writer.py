@@ -36,6 +36,7 @@ TRUTH = Truth(
     normal=NORMAL,
     coverage=np.ones((4, 5), np.float32),
     visible_views=np.full((4, 5), 6, np.uint16),
+    unscored=frozenset({1}),
 )
 
 
@@ -61,7 +62,7 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     assert dataset.views.cfa is None
     np.testing.assert_array_equal(np.asarray(dataset.views.radiance), LIGHT)
     assert dataset.truth is not None
-    for name in ("z_mm", "object_id", "names", "normal", "coverage", "visible_views"):
+    for name in ("z_mm", "object_id", "names", "normal", "coverage", "visible_views", "unscored"):
         np.testing.assert_array_equal(getattr(dataset.truth, name), getattr(TRUTH, name))
     assert dataset.truth.photons is not None
     for name in ("k", "l", "i", "j", "object_id", "z_mm"):
@@ -104,9 +105,10 @@ def test_the_identity_follows_from_the_content(tmp_path: Path) -> None:
         (PhotonCounts.from_dense(DENSE, replace(GRID, pitch_mm=(2.0, 1.0)), cfa="GRBG"), None),
         (COUNTED, Truth(Z_MM, IDS, {1: "ball"})),
         (COUNTED, Truth(Z_MM, IDS, {1: "cube"})),
+        (COUNTED, Truth(Z_MM, IDS, {1: "ball"}, unscored=frozenset({1}))),
     ]
     saved = [save_dataset(tmp_path / f"{n}", *other) for n, other in enumerate(others)]
-    assert len({first, *(dataset.manifest["identity"] for dataset in saved)}) == 6
+    assert len({first, *(dataset.manifest["identity"] for dataset in saved)}) == 7
 
 
 def test_a_folder_of_something_else_is_refused_and_untouched(tmp_path: Path) -> None:

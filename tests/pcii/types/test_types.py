@@ -67,6 +67,7 @@ def sections() -> Sections:
         (lambda: DepthMap(ONES, ONES[:1]), "z_mm, confidence: "),
         (lambda: Truth(ONES * NAN, IDS, {}), "z_mm: true depths are above 0 mm and never NaN"),
         (lambda: Truth(ONES, IDS + 2, {1: "ball"}), "object_id: id 2 has no name"),
+        (lambda: Truth(ONES, IDS, {1: "ball"}, unscored=frozenset({1, 2})), "unscored: there is no object"),
         (lambda: Truth(ONES, IDS, {}, coverage=ONES), r"coverage: expected float32 \(2, 2\)"),
         (
             lambda: Truth(ONES, IDS, {}, coverage=np.full((2, 2), 1.1, np.float32)),
