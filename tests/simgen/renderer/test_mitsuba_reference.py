@@ -195,7 +195,7 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
         ('<bsdf type="../../evil"/>', "outside the scene's folder"),
         ('<bsdf type="a.b"/>', "no name of a plugin"),
         ('<default name="d" value="."/>' + OBJ % "$d$d/secret.obj", "outside the scene's folder"),
-        (OBJ % "linked.obj", "outside the scene's folder"),
+        (OBJ % "linked.obj", "lies outside the folder"),
         (OBJ % "no.obj", "there is no file"),
         ('<include filename="scene.xml"/><include filename="scene.xml"/>', "deep"),
         ("<broken", "not valid XML"),
