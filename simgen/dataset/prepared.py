@@ -65,8 +65,8 @@ class Prepared:
         of the same photons, how they are read out (in frames of so many bits) and words about the scene make
         no other draw, nor does what is scored.
         """
-        words = {"title": True, "description": True, "planes_mm": True}
-        unseen = words | {"objects": {"__all__": {"scored"}}, "mitsuba": {"unscored"}}
+        unseen = dict.fromkeys(("title", "description", "planes_mm"), True)
+        unseen |= {"objects": {"__all__": {"scored"}}, "mitsuba": {"unscored"}}
         decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
         del decisive["photons"]["nested"]
         del decisive["sensor"]["frames"], decisive["sensor"]["bits"]

@@ -263,7 +263,7 @@ def check_unscored(unscored: Iterable[str], names: Sequence[str], source: str) -
     """Raise `InputError`, beginning with `source`, if one that counts in no score is not among the names."""
     for name in unscored:
         if name not in names:
-            there = shorten(", ".join(names)) or "nothing that is seen"
+            there = shorten(", ".join(names)) or "none"
             raise InputError(f"{source}: unscored: there is no object {shown_value(name)}; it has {there}")
 
 
