@@ -70,12 +70,12 @@ def draw_photons(
     prepared = _prepare("draw_photons", scene, grid, lens, errors, {"seed": seed, **values})
     recipe, render_scene = prepared.recipe, prepared.render_scene()
     capture, counting = prepared.capture, prepared.plan(render_scene)
-    check_resources(prepared.recipe, counting, Path())
+    check_resources(recipe, counting, Path(), prepared.map_counts)
     if counting.thins:
         arrivals, _ = thin(capture, prepared.setup(render_scene), counting, report)
     else:
         arrivals = _draw_from_rendered(capture, render_scene, counting, report)
-    detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
+    detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed, capture.dark_map)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
     counts = counts_of(counted, grid, recipe.cfa, recipe.sensor, keeps_frames=is_single)
@@ -85,8 +85,8 @@ def draw_photons(
         photons = PhotonTruth(**{name: origins[name] for name in (*"klij", "object_id", "z_mm")})
     centre = first_hits_at_centre(render_scene, grid)
     covered = coverage(render_scene, centre_camera(grid), centre.object_id)
-    truth = Truth(centre.z_mm, centre.object_id, render_scene.names, photons, centre.normal, covered)
-    return counts, truth
+    maps, names, unscored = (centre.z_mm, centre.object_id), render_scene.names, render_scene.unscored
+    return counts, Truth(*maps, names, photons, centre.normal, covered, unscored=unscored)
 
 
 def _draw_from_rendered(

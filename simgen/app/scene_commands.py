@@ -197,6 +197,7 @@ def import_scene(
     place_at_mm: tuple[float, float, float] | None = None,
     fit_mm: float | None = None,
     emission_unit: Literal["nit", "watt"] = "nit",
+    unscored: tuple[str, ...] = (),
 ) -> None:
     """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
 
@@ -226,10 +227,12 @@ def import_scene(
     emission_unit
         What emission of 1 means in a glTF file: 1 cd/m² (nit), or 1 W/(sr m²), which is 683 cd/m² (watt).
         Choose watt for files that Blender exported in its lighting mode Standard.
+    unscored
+        Name of an object that counts in no score, such as a table or a floor; may be repeated.
     """
     from simgen.importing.scene_import import import_scene
 
     place = {"camera": camera, "unit": unit, "place_at_mm": place_at_mm, "fit_mm": fit_mm}
-    for line in import_scene(file, out, **place, emission_unit=emission_unit).lines():
+    for line in import_scene(file, out, **place, emission_unit=emission_unit, unscored=unscored).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")

@@ -73,8 +73,8 @@ def named_files(value: Any, where: str = "") -> Iterator[tuple[str, AssetName]]:
 
 
 def asset(folder: Path, name: str, where: str) -> Path:
-    """The path of a scene's file; `InputError`, beginning with `where`, unless it is a plain file inside
-    the scene's folder, links followed, of a size that can be read."""
+    """The path of a file that a scene or recipe in `folder` names; `InputError`, beginning with `where`,
+    unless it is a plain file inside that folder, links followed, of a size that can be read."""
     root = folder.resolve()
     try:
         path = (root / name).resolve()
@@ -82,7 +82,7 @@ def asset(folder: Path, name: str, where: str) -> Path:
     except (OSError, RuntimeError, ValueError):  # links in a circle, a name too long, a NUL byte
         path, is_plain = root, False
     if not path.is_relative_to(root):
-        raise InputError(f"{where}: {name!r} lies outside the scene's folder")
+        raise InputError(f"{where}: {name!r} lies outside the folder {folder}")
     if not is_plain:
         raise InputError(f"{where}: there is no file {name!r} in {folder}")
     if path.stat().st_size > LARGEST_FILE_BYTES:

@@ -1,6 +1,7 @@
 """Findings on depth: disparities, blur between objects, planes, overlap, colours that are missing."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -36,13 +37,15 @@ def depth_findings(facts: Facts) -> list[Finding]:
         return []
     findings: list[Finding] = []
     if facts.seen:
-        findings = [_disparity_finding(facts), *_separation_findings(facts), *_focus_findings(facts)]
+        findings = [_disparity_finding(facts), *_separation_findings(facts)]
+    if facts.scored:
+        findings += _focus_findings(facts)
     return [*findings, _overlap_finding(facts), *_colour_findings(facts)]
 
 
 def _disparity_finding(facts: Facts) -> Finding:
     """Disparity of the nearest and farthest point of any object, and the blur between the two."""
-    grid, (near_mm, far_mm) = facts.grid, _depths_seen(facts)
+    grid, (near_mm, far_mm) = facts.grid, _depths_of(facts.seen)
     spread_px = float(apart_px(grid, near_mm, far_mm))
     text = (
         f"{_disparity(facts, near_mm)} at the nearest point, {near_mm:.0f} mm, and "
@@ -59,7 +62,7 @@ def _disparity_finding(facts: Facts) -> Finding:
 
 def _separation_findings(facts: Facts) -> list[Finding]:
     """Blur between the nearest two of the objects that are neighbours in depth, by their median depths."""
-    ordered = sorted(facts.seen, key=lambda thing: thing.middle_mm)
+    ordered = sorted(facts.scored, key=lambda thing: thing.middle_mm)
     pairs = [(float(apart_px(facts.grid, a.middle_mm, b.middle_mm)), a, b) for a, b in pairwise(ordered)]
     pairs = [pair for pair in pairs if pair[0] >= ONE_PLANE_PX]
     if not pairs:
@@ -85,11 +88,11 @@ def _wider_pitch(facts: Facts, factor: float) -> str:
 def _focus_findings(facts: Facts) -> list[Finding]:
     """The object that is least in focus, planes without objects, no planes at all, and the depth range."""
     planes, analysis, findings = facts.planes_mm, facts.target.recipe.analysis, []
-    shares = np.array([[focus_share(facts, thing, z) for z in planes] for thing in facts.seen])
+    shares = np.array([[focus_share(facts, thing, z) for z in planes] for thing in facts.scored])
     best, names = shares.max(axis=1), listed([f"{z:g}" for z in planes])
-    blurred = [f"{t.middle_mm:.0f}" for t, s in zip(facts.seen, best, strict=True) if s < MIN_FOCUS_SHARE]
+    blurred = [f"{t.middle_mm:.0f}" for t, s in zip(facts.scored, best, strict=True) if s < MIN_FOCUS_SHARE]
     text = (
-        f"of {facts.seen[best.argmin()].name}, the object least in focus, {best.min():.0%} is in focus at "
+        f"of {facts.scored[best.argmin()].name}, the object least in focus, {best.min():.0%} is in focus at "
         f"the best of the planes {names} mm"
     )
     remedy = f"add {listed(blurred)} to analysis.z_mm" if blurred else ""
@@ -101,7 +104,7 @@ def _focus_findings(facts: Facts) -> list[Finding]:
         empty = listed([f"{z:g}" for z, share in zip(planes, shares.max(axis=0), strict=True) if not share])
         remedy = "take that from analysis.z_mm or move an object there"
         findings.append(Finding("warn", "focus", f"no object is in focus at {empty} mm", remedy))
-    limits_mm, (near_mm, far_mm) = analysis.z_range_mm, _depths_seen(facts)
+    limits_mm, (near_mm, far_mm) = analysis.z_range_mm, _depths_of(facts.scored)
     if limits_mm is not None and not limits_mm[0] <= near_mm <= far_mm <= limits_mm[1]:
         text = f"depth maps look from {limits_mm[0]:g} to {limits_mm[1]:g} mm, where not all objects are"
         remedy = f"analysis.z_range_mm = [{math.floor(near_mm)}, {math.ceil(far_mm)}]"
@@ -114,9 +117,9 @@ def focus_share(facts: Facts, thing: ObjectFacts, z_mm: float) -> float:
     return float((apart_px(facts.grid, thing.z_mm, z_mm) / 2 <= FOCUS_PX).mean())
 
 
-def _depths_seen(facts: Facts) -> tuple[float, float]:
-    """The nearest and the farthest depth of any object that is seen."""
-    return float(min(t.z_mm.min() for t in facts.seen)), float(max(t.z_mm.max() for t in facts.seen))
+def _depths_of(things: Sequence[ObjectFacts]) -> tuple[float, float]:
+    """The nearest and the farthest depth at which any of them is seen."""
+    return float(min(t.z_mm.min() for t in things)), float(max(t.z_mm.max() for t in things))
 
 
 def _overlap_finding(facts: Facts) -> Finding:

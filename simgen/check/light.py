@@ -33,9 +33,10 @@ def photon_findings(facts: Facts) -> list[Finding]:
     findings += _saturation_findings(facts)
     sensor, grid = facts.target.recipe.sensor, facts.grid
     dark = (sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts) * grid.height * grid.width
+    dark += facts.target.map_counts / grid.view_count
     if dark > MAX_OTHER_SHARE * (dark + total):
         text = f"{_number(dark)} dark counts per view, {dark / (dark + total):.0%} of all counts"
-        findings.append(Finding("warn", "photons", text, "lower sensor.dark_counts"))
+        findings.append(Finding("warn", "photons", text, "take more light, or a sensor with fewer"))
     return findings
 
 
@@ -102,14 +103,15 @@ def _number(value: float) -> str:
 
 def cost_findings(facts: Facts) -> list[Finding]:
     """What will be written and what it takes, before compression and to an order of magnitude."""
-    recipe, plan = facts.target.recipe, facts.plan
+    recipe, plan, dark = facts.target.recipe, facts.plan, facts.target.map_counts
     sizes = product_bytes(recipe, plan)
     size = ", ".join(f"{name} {in_bytes(of_name)}" for name, of_name in sizes.items()) or "only a manifest"
-    lack = shortage(recipe, plan, facts.memory_bytes)
-    peak = f"{in_bytes(peak_bytes(recipe, plan))} at the peak, of {in_bytes(facts.memory_bytes)} available"
+    lack = shortage(recipe, plan, facts.memory_bytes, dark)
+    peak, room = in_bytes(peak_bytes(recipe, plan, dark)), in_bytes(facts.memory_bytes)
+    memory = f"{peak} at the peak, of {room} available"
     return [
         Finding("ok", "size", f"{size}, before compression"),
-        Finding("ok", "memory", peak) if lack is None else Finding("bad", "memory", lack),
+        Finding("ok", "memory", memory) if lack is None else Finding("bad", "memory", lack),
         Finding("ok", "time", f"{_way(facts)}in the order of {in_time(seconds(facts))} on this machine"),
     ]
 

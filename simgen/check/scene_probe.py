@@ -66,6 +66,7 @@ class ObjectFacts:
     corners_seeing_all: int = 4
     is_cut_at_centre: bool = False
     shines: bool = False
+    is_scored: bool = True
 
     @cached_property
     def middle_mm(self) -> float:
@@ -107,11 +108,16 @@ class Facts:
         """The objects that the virtual centre sees."""
         return tuple(thing for thing in self.objects if thing.z_mm.size)
 
+    @property
+    def scored(self) -> tuple[ObjectFacts, ...]:
+        """Those of them that count in scores."""
+        return tuple(thing for thing in self.seen if thing.is_scored)
+
     @cached_property
     def planes_mm(self) -> tuple[float, ...]:
-        """Depths to look at: those of the recipe, else the objects', each in focus at one of them."""
+        """Depths to look at: those of the recipe, else of what is scored, each in focus at one of them."""
         planes: list[float] = []
-        for middle_mm in sorted(thing.middle_mm for thing in self.seen):
+        for middle_mm in sorted(thing.middle_mm for thing in self.scored):
             if not planes or apart_px(self.grid, planes[-1], middle_mm) > MAX_PLANE_BLUR_PX:
                 planes.append(float(round(middle_mm)) or middle_mm)
         return self.target.recipe.analysis.z_mm or tuple(planes)
@@ -152,6 +158,7 @@ def probe_scene(target: Prepared) -> Facts:
             corners_seeing_all=sum(bool(view.any()) and not _is_cut(view) for view in views),
             is_cut_at_centre=_is_cut(mask),
             shines=number in shining,
+            is_scored=number not in render_scene.unscored,
         )
         objects.append(facts)
     return Facts(

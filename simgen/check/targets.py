@@ -40,7 +40,8 @@ def lint(
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
     first = f"; of {', '.join(sweep.fields)} the first value" if sweep.axes else ""
     line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {sensor.bayer or 'mono'}{first}"
-    if lack := shortage(target.recipe, None, available_bytes()):  # so that it cannot even be looked at
+    # So that it cannot even be looked at:
+    if lack := shortage(target.recipe, None, available_bytes(), target.map_counts):
         return line, [Finding("bad", "memory", lack)]
     return line, findings(probe_scene(target))
 

@@ -109,7 +109,8 @@ def other_dataset(out: Path, what: str, recorded: Mapping[str, str]) -> InputErr
     """That a folder holds something of other software or, if its versions agree, of another recipe."""
     differences = other_versions(recorded)
     if not differences:
-        return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
+        text = f"{out}: holds the {what} of another recipe or scene, or of other files that they name"
+        return InputError(f"{text}; name a new or empty folder")
     return InputError(
         f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a new or "
         "empty folder, or install that software"

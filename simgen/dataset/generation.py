@@ -108,13 +108,13 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return read_whole(out, identity, content=True)
-        check_resources(recipe, None, out)
+        check_resources(recipe, None, out, prepared.map_counts)
         with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
             render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
         if recipe.products.counts:  # likewise: too much light
             with _timed(timings_s, "plan"):
                 counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
-                check_resources(recipe, counting, out)
+                check_resources(recipe, counting, out, prepared.map_counts)
         sweep_temporaries(out)
         photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
@@ -187,6 +187,7 @@ def _description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any
         "radiance_channels": {"none": None, "mosaic": 1, "rgb": channels}[recipe.products.radiance],
         "radiance_unit": SPECTRAL_UNIT if recipe.is_spectral else RGB_UNIT,
         "objects": {str(number): name for number, name in render_scene.names.items()},
+        "unscored": sorted(render_scene.unscored),
         "analysis": recipe.analysis.model_dump(mode="json"),
         "recipe": prepared.recipe_of_data,
         "scene": scene.model_dump(mode="json"),

@@ -1,8 +1,9 @@
 """A recipe with all that it names, and what each stage of the work takes of it."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.detector import photons_per_radiance, sensitivities
+from simgen.sensor.detector import dark_map, photons_per_radiance, sensitivities
 from simgen.spec.recipe import Analysis, Recipe
 from simgen.spec.scene import Scene, checked_folder, scene_files
 from simgen.spec.scene_lookup import load_scene
@@ -33,19 +34,24 @@ AROUND_PLANES_MM = 60.0
 class Prepared:
     """What a dataset is made from; the recipe with depths to look at, if the scene names them.
 
-    `curves` (C, N) are the sensor's sensitivities by wavelength, None in RGB mode.
+    `curves` (C, N) are the sensor's sensitivities by wavelength, None in RGB mode, and `dark_map` its mean
+    counts without light, (H, W) or (K, L, H, W), None without a file of them.
     """
 
     recipe: Recipe
     scene: Scene
     folder: Path
     curves: np.ndarray | None
+    dark_map: np.ndarray | None = None
 
     @cached_property
     def scene_content(self) -> dict[str, Any]:
-        """All that decides what the sensor sees of the scene: its values, hashes of its files, curves."""
+        """All that decides what the sensor sees of the scene: its values, hashes of its files, curves, and
+        the hash of the map of dark counts if there is one."""
         assets = {str(name): asset(self.folder, name, where) for where, name in scene_files(self.scene)}
-        return {
+        dark_map = self.dark_map
+        dark = {} if dark_map is None else {"dark_map": sha256(dark_map.tobytes()).hexdigest()}
+        return dark | {
             "scene": self.scene.model_dump(mode="json"),
             "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
             "sensitivities": None if self.curves is None else self.curves.tolist(),
@@ -57,13 +63,14 @@ class Prepared:
 
         So one seed in a recipe gives unrelated photons in each dataset of a sweep. Products, smaller budgets
         of the same photons, how they are read out (in frames of so many bits) and words about the scene make
-        no other draw.
+        no other draw, nor does what is scored.
         """
-        words = {"title", "description", "planes_mm"}
+        unseen = dict.fromkeys(("title", "description", "planes_mm"), True)
+        unseen |= {"objects": {"__all__": {"scored"}}, "mitsuba": {"unscored"}}
         decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
         del decisive["photons"]["nested"]
         del decisive["sensor"]["frames"], decisive["sensor"]["bits"]
-        drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=words)}
+        drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=unseen)}
         return seeds.seed_of_draw(self.recipe.seed, [drawn, decisive, self.recipe.render.max_depth])
 
     @cached_property
@@ -110,7 +117,13 @@ class Prepared:
     @cached_property
     def capture(self) -> Capture:
         """What decides which photons arrive where."""
-        return capture_of(self.recipe, self.seed)
+        return replace(capture_of(self.recipe, self.seed), dark_map=self.dark_map)
+
+    @property
+    def map_counts(self) -> float:
+        """Mean number of counts that the map of dark counts adds to all views."""
+        shape = self.recipe.grid.camera_grid().shape_KLHW
+        return 0.0 if self.dark_map is None else float(self.dark_map.mean() * np.prod(shape, dtype=float))
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
@@ -129,7 +142,7 @@ class Prepared:
         setup, kind, room = self.setup(render_scene), backend.choose().kind, available_bytes()
 
         def may_explore(counting: Plan) -> bool:
-            return shortage(self.recipe, counting, room) is None
+            return shortage(self.recipe, counting, room, self.map_counts) is None
 
         return plan(self.capture, setup, kind, least_samples(self.recipe), may_explore=may_explore)
 
@@ -149,7 +162,9 @@ def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = Non
         around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
         analysis = Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
     resolved = recipe.model_copy(update={"analysis": analysis})
-    return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, recipe_folder or Path()))
+    beside, grid = recipe_folder or Path(), recipe.grid.camera_grid()
+    curves = sensitivities(recipe.sensor, beside)
+    return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, beside))
 
 
 def capture_of(recipe: Recipe, seed: int) -> Capture:

@@ -133,7 +133,10 @@ class RenderedViews:
             assert self.exposure is not None
             gain = photons_per_radiance(self.exposure, capture.grid.pixel_mm)
             rng = seeds.generator(capture.seed, view=k * capture.grid.cols + l, stage="full light")
-            measured = full_light_image(read_exr(exact), capture.cfa, gain, self.sensor, rng)
+            dark_map = capture.dark_map
+            if dark_map is not None:
+                dark_map = np.broadcast_to(dark_map, capture.grid.shape_KLHW)[k, l]
+            measured = full_light_image(read_exr(exact), capture.cfa, gain, self.sensor, rng, dark_map)
             write_exr_safely(self.out / radiance_name(k, l), measured)
 
     def _noise_file(self, k: int, l: int) -> Path:

@@ -31,8 +31,11 @@ EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
 
-def bytes_of_steps(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
-    """Memory of each step of the work by the fields that it grows with; without a plan of the first ones."""
+def bytes_of_steps(recipe: Recipe, plan: Plan | None, map_counts: float = 0.0) -> dict[str, float]:
+    """Memory of each step of the work by the fields that it grows with; without a plan of the first ones.
+
+    `map_counts` is the mean number of counts that the map `sensor.hot_pixels` adds to all views.
+    """
     grid, sensor, products = recipe.grid, recipe.sensor, recipe.products
     pixels, views = float(grid.height * grid.width), float(grid.rows * grid.cols)
     each = PHOTON_BYTES if sensor.bits is not None or products.frames else ORIGIN_BYTES
@@ -42,6 +45,7 @@ def bytes_of_steps(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
         "grid.rows, grid.cols": VIEW_BYTES * views,
         "analysis.z_mm": PLANE_BYTES * pixels * len(recipe.analysis.z_mm) * products.truth,
         "sensor.dark_counts": PHOTON_BYTES * sensor.dark_counts * pixels * views * products.counts,
+        "sensor.hot_pixels": PHOTON_BYTES * map_counts * products.counts,
         "sensor.hot_pixel_share, sensor.hot_pixel_counts": hot * pixels * views * products.counts,
     }
     if plan is None:
@@ -58,22 +62,22 @@ def bytes_of_steps(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
     return steps
 
 
-def peak_bytes(recipe: Recipe, plan: Plan | None) -> float:
+def peak_bytes(recipe: Recipe, plan: Plan | None, map_counts: float = 0.0) -> float:
     """Memory at the peak: of the libraries and of the largest step."""
-    return BASE_BYTES + max(bytes_of_steps(recipe, plan).values())
+    return BASE_BYTES + max(bytes_of_steps(recipe, plan, map_counts).values())
 
 
-def shortage(recipe: Recipe, plan: Plan | None, room: float) -> str | None:
+def shortage(recipe: Recipe, plan: Plan | None, room: float, map_counts: float = 0.0) -> str | None:
     """A sentence on the largest step, if memory of `room` bytes cannot hold it; None if it can."""
-    field, most = max(bytes_of_steps(recipe, plan).items(), key=lambda step: step[1])
+    field, most = max(bytes_of_steps(recipe, plan, map_counts).items(), key=lambda step: step[1])
     if most <= room:
         return None
     return f"{field}: takes some {in_bytes(most)} of memory, and this machine has {in_bytes(room)} available"
 
 
-def check_resources(recipe: Recipe, plan: Plan | None, out: Path) -> None:
+def check_resources(recipe: Recipe, plan: Plan | None, out: Path, map_counts: float = 0.0) -> None:
     """Raise `InputError` if memory cannot hold a step, or the disk of `out` the rendered views."""
-    sentence = shortage(recipe, plan, available_bytes())
+    sentence = shortage(recipe, plan, available_bytes(), map_counts)
     if sentence is not None:
         raise InputError(sentence)
     place = next(folder for folder in (out, *out.absolute().parents) if folder.exists())

@@ -16,8 +16,10 @@ from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
 from simgen.importing.gltf_scene import GltfScene, Part
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_reference import reference_to
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
-from simgen.spec.scene import Scene, names_of_objects
+from simgen.spec.scene import Scene, check_unscored, names_of_objects
 
 MIN_SHEAR = 1e-5
 """Axes of a matrix whose cosine is less than this are square to each other."""
@@ -77,6 +79,7 @@ def import_scene(
     place_at_mm: Sequence[float] | None = None,
     fit_mm: float | None = None,
     emission_unit: EmissionUnit = "nit",
+    unscored: Sequence[str] = (),
 ) -> ImportedScene:
     """Make the folder `out` of a glTF file (.glb, .gltf) or a Mitsuba scene (.xml).
 
@@ -86,7 +89,8 @@ def import_scene(
     its longest side so long.
     `emission_unit` is that of the emission of a glTF file's materials: nit, which are cd/m^2, or watt, which
     are W/(sr m^2) and become 683 cd/m^2 each, as lights do that Blender exports in its mode Standard.
-    Raises `pcii.InputError` for a file that cannot be read, and for a folder that is there already.
+    `unscored` are names of objects that count in no score, such as a floor. Raises `pcii.InputError` for a
+    file that cannot be read or has no such object, and for a folder that is there already.
     """
     path, folder = Path(file), Path(out)
     suffix = path.suffix.lower()
@@ -100,15 +104,18 @@ def import_scene(
         raise InputError(f"{folder}: is there already; choose another folder or remove it")
     values = {"file": path.name, "unit_mm": MM_PER_UNIT[unit], "camera": camera, "fit_mm": fit_mm}
     values["place_at_mm"] = None if place_at_mm is None else tuple(place_at_mm)
+    values["unscored"] = tuple(unscored)
     reference = validate(MitsubaFile, {k: v for k, v in values.items() if v is not None}, "import-scene")
     if suffix == ".xml":
         return _copy_reference(path, reference, folder)
     scene = GltfScene(path, reference.unit_mm, CD_M2_PER_EMISSION[emission_unit])
-    return _write_scene(scene, *scene.placement(camera, reference.place_at_mm, fit_mm), folder)
+    return _write_scene(scene, *scene.placement(camera, reference.place_at_mm, fit_mm), unscored, folder)
 
 
 def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedScene:
     """Make the folder of a scene that refers to a Mitsuba file, a copy with all files that it names."""
+    if reference.unscored:  # Mitsuba alone knows the names of the objects
+        reference_to(backend.load(), reference, path.parent)
     names = (path.name, *files_named_by(path.parent, path.name))
     scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=reference)
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -121,11 +128,17 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
     return ImportedScene(out, left_out, names)
 
 
-def _write_scene(scene: GltfScene, to_world: np.ndarray, camera: str | None, out: Path) -> ImportedScene:
+def _write_scene(
+    scene: GltfScene, to_world: np.ndarray, camera: str | None, unscored: Sequence[str], out: Path
+) -> ImportedScene:
     """Write the folder of a translated scene."""
     gltf, meshes = scene.gltf, Meshes()
     names = names_of_objects([part.name for part in scene.parts])
-    objects = [_object(part, name, to_world, meshes) for part, name in zip(scene.parts, names, strict=True)]
+    check_unscored(unscored, names, str(gltf.path))
+    objects = [
+        _object(part, name, to_world, meshes) | {"scored": name not in unscored}
+        for part, name in zip(scene.parts, names, strict=True)
+    ]
     growth = float(np.linalg.norm(to_world[:3, 0])) / scene.unit_mm
     lights = [_light(to_world @ matrix, values, growth) for matrix, values in scene.lamps]
     if not lights and not any("emission" in part.material for part in scene.parts):

@@ -60,7 +60,7 @@ class Capture:
     """What decides which photons arrive where: cameras, Bayer pattern, budget or exposure, and the seed.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance; None unless photons are
-    counted over an exposure.
+    counted over an exposure. `dark_map` is what pixels count without any, as of `detect`.
     """
 
     rig: Rig
@@ -68,6 +68,7 @@ class Capture:
     photons: Photons
     photons_per_radiance: float | None
     seed: int
+    dark_map: np.ndarray | None = None
 
     @property
     def grid(self) -> CameraGrid:

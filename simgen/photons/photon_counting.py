@@ -120,7 +120,7 @@ def write_counts(
     Returns what the manifest says of them.
     """
     grid, cfa, photons = capture.grid, capture.cfa, capture.photons
-    counts = detector.detect(arrivals, grid, cfa, sensor, capture.seed)
+    counts = detector.detect(arrivals, grid, cfa, sensor, capture.seed, capture.dark_map)
     log: dict[str, Any] = {"arrived": int(arrivals.n.sum()), "detected": int(counts.n.sum())}
     if photons.nested and (sensor.bits is not None or keeps_frames):
         counts = detector.in_frames(counts, sensor, capture.seed)  # the same ones in each budget

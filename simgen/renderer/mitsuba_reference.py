@@ -18,7 +18,7 @@ from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
 from simgen.renderer.emission import ShiningSurface, sample_light
 from simgen.renderer.mitsuba_shapes import WorldFrame, across_faces
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
-from simgen.spec.scene import names_of_objects
+from simgen.spec.scene import check_unscored, names_of_objects
 from simgen.spectral.filters import Filters
 from simgen.spectral.spectra import WAVELENGTH_NM, integral
 
@@ -112,7 +112,8 @@ class Reference:
 def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     """A Mitsuba scene of the scene's folder, standing where `file` says.
 
-    Raises `InputError` for a file that names what lies elsewhere, cannot be read, or has no such camera.
+    Raises `InputError` for a file that names what lies elsewhere, cannot be read, or has no such camera or
+    object.
     """
     path = folder / file.file
     list(files_named_by(folder, file.file))  # refuses what leads outside, before Mitsuba sees the file
@@ -122,6 +123,7 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     has_media = any(_kind(node) == "Medium" for node in state.nodes)
     has_instances = any(node.props.plugin_name() == "instance" for node in state.nodes)
     frame, names = _frame(mi, file, path, state), tuple(names_of_objects(ids))
+    check_unscored(file.unscored, names, str(path))
     return Reference(mi, path, frame, names, has_media, has_instances)
 
 

@@ -30,10 +30,10 @@ class RenderScene:
     """A scene that Mitsuba can render, and which of its shapes is which object.
 
     `object_of_shape` has object ids by Mitsuba's shape number, int16, 0 for a miss, the backdrop and lamps;
-    `names` are those of objects by id, from 1. `filters` are what the camera's pixels see of spectra, None
-    where light is linear sRGB. `shining` is all that shines and can be seen but for what is all around, and
-    `why_rendered` a clause on what the tracer of single photons does not cover. With `has_instances` some
-    objects are instances of a group of shapes.
+    `names` are those of objects by id, from 1; those of `unscored` count in no score. `filters` are what the
+    camera's pixels see of spectra, None where light is linear sRGB. `shining` is all that shines and can be
+    seen but for what is all around, and `why_rendered` a clause on what the tracer of single photons does not
+    cover. With `has_instances` some objects are instances of a group of shapes.
     """
 
     mi: Any
@@ -45,6 +45,7 @@ class RenderScene:
     why_rendered: str = ""
     frame: WorldFrame = field(default_factory=WorldFrame)
     has_instances: bool = False
+    unscored: frozenset[int] = frozenset()
 
 
 def build(
@@ -67,6 +68,9 @@ def build(
     frame = WorldFrame() if reference is None else reference.frame
     ids = {f"{OBJECT}{number}": number for number in range(1, len(scene.objects) + 1)}
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
+    unscored = {thing.name for thing in scene.objects if not thing.scored}
+    if scene.mitsuba is not None:
+        unscored.update(scene.mitsuba.unscored)
     referenced_lux, has_media, has_instances = 0.0, False, False
     if reference is not None:
         has_media, has_instances = reference.has_media, reference.has_instances
@@ -106,9 +110,8 @@ def build(
     numbers = shape_numbers(loaded)
     object_of_shape = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
     object_of_shape[numbers] = [ids.get(shape.id(), 0) for shape in loaded.shapes()]
-    return RenderScene(
-        mi, loaded, object_of_shape, names, filters, tuple(shining), why_rendered, frame, has_instances
-    )
+    seen = mi, loaded, object_of_shape, names, filters, tuple(shining), why_rendered, frame, has_instances
+    return RenderScene(*seen, frozenset(number for number, name in names.items() if name in unscored))
 
 
 def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:

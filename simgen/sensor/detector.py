@@ -19,10 +19,13 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.exchange.count_arrays import map_array
+from pcii.types.arrays import read_only
 from pcii.types.bayer import colour_index, mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_counts import PhotonCounts
 from simgen.base import random_streams as seeds
+from simgen.base.file_lookup import asset
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
 from simgen.spec.recipe import Exposure, Photons, Sensor
 from simgen.spectral.filters import sensitivity
@@ -57,6 +60,24 @@ def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:
             "set sensor.cfa to 'none'"
         )
     return curves
+
+
+def dark_map(sensor: Sensor, grid: CameraGrid, recipe_folder: Path) -> np.ndarray | None:
+    """Mean counts without light, (H, W) or (K, L, H, W) float64, of the file that `sensor.hot_pixels` names.
+
+    None without one. Raises `InputError` for a file that is not in `recipe_folder` or no .npy file, for
+    another shape, and for what are no finite numbers from 0.
+    """
+    if sensor.hot_pixels is None:
+        return None
+    path = asset(recipe_folder, sensor.hot_pixels, "sensor.hot_pixels")
+    counts = map_array(path)
+    if counts.shape not in (grid.shape_HW, grid.shape_KLHW):
+        expected = f"(H, W) = {grid.shape_HW}, or (K, L, H, W) = {grid.shape_KLHW}"
+        raise InputError(f"{path}: expected mean dark counts {expected}, got {counts.shape}")
+    if counts.dtype.kind not in "fiu" or not ((counts >= 0) & (counts < np.inf)).all():
+        raise InputError(f"{path}: expected mean dark counts that are finite numbers from 0")
+    return read_only(np.array(counts, dtype=np.float64))
 
 
 def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
@@ -124,9 +145,17 @@ def nested_subset(
 
 
 def detect(
-    arrivals: PhotonTable, grid: CameraGrid, cfa: str | None, sensor: Sensor, seed: int
+    arrivals: PhotonTable,
+    grid: CameraGrid,
+    cfa: str | None,
+    sensor: Sensor,
+    seed: int,
+    dark_map: np.ndarray | None = None,
 ) -> PhotonTable:
-    """Counts of the whole exposure that come of arriving photons, before a counter stops."""
+    """Counts of the whole exposure that come of arriving photons, before a counter stops.
+
+    `dark_map` has mean counts without light, (H, W) or (K, L, H, W), on top of `sensor.dark_counts`.
+    """
     rng = seeds.generator(seed, stage="detection")
     efficiency = np.array(sensor.quantum_efficiency)[arrivals.colours(cfa)]
     if (efficiency < 1).any():
@@ -137,6 +166,13 @@ def detect(
         number = rng.poisson(sensor.dark_counts * views * pixels)
         dark = rng.integers(0, views * pixels, number)
         parts.append(_without_photon(grid, dark, np.ones(number, np.int64)))
+    if dark_map is not None:
+        # Counts of all views at once, each of which then falls into a view evenly.
+        each = views if dark_map.ndim == 2 else 1
+        n = rng.poisson(each * dark_map.ravel())
+        dark = np.arange(n.size).repeat(n)
+        dark += pixels * rng.integers(each, size=dark.size)
+        parts.append(_without_photon(grid, dark, np.ones(dark.size, np.int64)))
     # One camera takes all views, so its faulty pixels are the same in each.
     faulty = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
     hot = faulty[: round(sensor.hot_pixel_share * pixels)]
@@ -254,14 +290,19 @@ def _cells(
 
 
 def full_light_image(
-    radiance: np.ndarray, cfa: str | None, photons_per_unit: float, sensor: Sensor, rng: np.random.Generator
+    radiance: np.ndarray,
+    cfa: str | None,
+    photons_per_unit: float,
+    sensor: Sensor,
+    rng: np.random.Generator,
+    dark_map: np.ndarray | None = None,
 ) -> np.ndarray:
     """Radiance (H, W, C) as a camera would measure it, float32, in the same unit.
 
     Photons arrive at random and are detected with the quantum efficiency; a pixel holds no more than
     its full well, reading adds noise, the converter has steps. What it reads is divided by the
     efficiency and by `photons_per_unit`, the photons that a unit of radiance gives. `C` is 1 behind a
-    filter, or 3.
+    filter, or 3. `dark_map` (H, W) has mean counts on top of `sensor.dark_counts`.
     """
     light = sensor.full_light
     assert light is not None
@@ -270,7 +311,8 @@ def full_light_image(
         flat = np.broadcast_to(efficiency, (*radiance.shape[:2], 3))
         efficiency = (mosaic(flat, cfa) if cfa else flat[..., 1])[..., None]
     per_unit = efficiency * photons_per_unit
-    electrons = rng.poisson(radiance * per_unit + sensor.dark_counts).astype(np.float64)
+    dark = sensor.dark_counts + (0.0 if dark_map is None else dark_map[..., None])
+    electrons = rng.poisson(radiance * per_unit + dark).astype(np.float64)
     electrons = np.minimum(electrons, light.full_well_e)
     electrons += rng.normal(0, light.read_noise_e, electrons.shape)
     steps = (1 << light.adc_bits) - 1

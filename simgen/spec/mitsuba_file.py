@@ -40,6 +40,8 @@ class MitsubaFile(Strict):
     """Where the middle of the bounding box of its shapes stands, whatever sensors it has."""
     fit_mm: Length | None = None
     """Length of the longest side of that box, instead of `unit_mm`."""
+    unscored: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
+    """Names of its objects that count in no score."""
 
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:

@@ -163,6 +163,10 @@ class Sensor(Strict):
     """Share of the pixels that are hot: the same ones in every view, since one sensor takes them all."""
     hot_pixel_counts: NonNegative = 1.0
     """Mean number of counts that a hot pixel has in each view without any light."""
+    hot_pixels: Annotated[str | None, Field(exclude_if=lambda name: name is None)] = None
+    """A map of further dark counts, such as a measured one: a .npy file in the recipe's folder with the mean
+    number of counts that each pixel of a view has without any light, (H, W), or (K, L, H, W) if cameras
+    differ."""
     dead_pixel_share: Share = 0.0
     """Share of the pixels that never count; the same ones in every view."""
     frames: Annotated[Whole, Field(ge=1, le=MOST_FRAMES)] = 1

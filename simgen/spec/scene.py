@@ -10,7 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
@@ -25,6 +25,7 @@ from simgen.base.strict_models import (
     Strict,
     Title,
     Vector,
+    shorten,
     shown_value,
     suggestion,
     toml_text,
@@ -53,6 +54,8 @@ class SceneObject(Strict):
     """Turns about the X, Y and Z axes, applied in this order, in degrees."""
     shape: Shape
     material: Material
+    scored: Annotated[bool, Field(exclude_if=bool)] = True
+    """False for what is there but counts in no score, such as a table, a floor or a wall."""
 
 
 class Backdrop(Strict):
@@ -113,7 +116,7 @@ class Scene(Strict):
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
     """A wall behind the objects, which is no object itself."""
-    mitsuba: MitsubaScene | None = None
+    mitsuba: Annotated[MitsubaScene | None, Field(exclude_if=lambda file: file is None)] = None
     """A Mitsuba scene by the name of its XML file, or a table that says where it stands, too. All that it has
     is part of the scene, beside objects and lights of its own."""
     planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES)] = ()
@@ -140,12 +143,6 @@ class Scene(Strict):
         if not self.lights and not shines:
             raise ValueError("'lights': nothing shines; give a light, or an object a material.emission")
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_what_is_not_there(self, serialize: Any) -> dict[str, Any]:
-        """Scenes without a Mitsuba file keep their digests, and so their photons."""
-        values = serialize(self)
-        return {name: value for name, value in values.items() if name != "mitsuba" or value is not None}
 
     def __eq__(self, other: Any) -> bool:
         return isinstance(other, Scene) and dict(self) == dict(other)
@@ -260,6 +257,14 @@ def names_of_objects(names: Sequence[str], taken: Iterable[str] = ()) -> list[st
         unique.append(next(candidate for candidate in candidates if candidate not in used))
         used.add(unique[-1])
     return unique
+
+
+def check_unscored(unscored: Iterable[str], names: Sequence[str], source: str) -> None:
+    """Raise `InputError`, beginning with `source`, if one that counts in no score is not among the names."""
+    for name in unscored:
+        if name not in names:
+            there = shorten(", ".join(names)) or "none"
+            raise InputError(f"{source}: unscored: there is no object {shown_value(name)}; it has {there}")
 
 
 def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:

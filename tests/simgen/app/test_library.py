@@ -30,13 +30,15 @@ SCENE = simgen.Scene(
             position_mm=(0, 0, 620),
             shape=simgen.Card(width_mm=400, height_mm=300),
             material=simgen.Material(texture=simgen.Checks(rows=6, columns=8)),
+            scored=False,
         ),
     ),
     lights=(simgen.UniformLight(luminance_cd_m2=100),),
 )
 LENS = simgen.Lens(aperture_mm=6, focus_mm=560)
 ERRORS = {"position_sd_mm": [0.5, 0.5, 0.1], "rotation_sd_deg": [0.1, 0.1, 0.2], "pitch_error": 0.01}
-SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "frames": 3, "bits": 1}
+FRAMES = {"frames": 3, "bits": 1}
+SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "hot_pixels": "map.npy", "dead_pixel_share": 0.1, **FRAMES}
 
 
 def dataset_of(out: Path, scene: simgen.Scene, **tables: Any) -> pcii.Dataset:
@@ -61,6 +63,7 @@ def assert_same(counts: pcii.PhotonCounts, truth: pcii.Truth, dataset: pcii.Data
         np.testing.assert_array_equal(counts.frame, dataset.counts.frame)
     assert dataset.truth is not None
     assert truth.names == dataset.truth.names
+    assert truth.unscored == dataset.truth.unscored == {2}
     for name in ("z_mm", "object_id", "normal", "coverage"):
         np.testing.assert_array_equal(getattr(truth, name), getattr(dataset.truth, name))
     for name in ("k", "l", "i", "j", "object_id", "z_mm"):
@@ -69,7 +72,11 @@ def assert_same(counts: pcii.PhotonCounts, truth: pcii.Truth, dataset: pcii.Data
 
 
 @pytest.mark.renders
-def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Path) -> None:
+def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.save("map.npy", np.where(np.arange(60) == 7, 0.5, np.zeros((64, 60))))
     dataset = dataset_of(
         tmp_path,
         SCENE,
@@ -82,6 +89,10 @@ def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Pa
     )
     assert dataset.counts.readout == Readout(3, 1)
     assert dataset.counts.frame is not None
+    hot, beside = (dataset.counts.dense[..., column].mean() for column in (7, 8))
+    assert (
+        0.3 < hot - beside < 0.5
+    )  # of a mean of 0.5 counts a tenth is dead, and frames of one bit hold less
     options: dict[str, Any] = {"budget": 300, "seed": 3, "lens": LENS.model_dump(), "max_depth": 6}
     models: dict[str, Any] = {
         "errors": simgen.CalibrationErrors.model_validate(ERRORS),

@@ -112,7 +112,8 @@ def test_share_in_focus_is_what_blurs_by_one_pixel() -> None:
 
 
 def test_depths_that_nobody_names_are_warned_of() -> None:
-    found = about("focus", depth_findings(facts(thing("a", 540), thing("b", 620))))
+    floor = thing("floor", 545, 900, is_scored=False)  # whose depths are no advice
+    found = about("focus", depth_findings(facts(thing("a", 540), floor, thing("b", 620))))
     assert verdicts(found) == ["ok", "warn"]
     assert found[1].remedy == "add planes_mm = [540, 620] to the scene"
 
@@ -120,7 +121,8 @@ def test_depths_that_nobody_names_are_warned_of() -> None:
 @pytest.mark.parametrize("z_range_mm", [[450, 541], [0.45, 0.75]])
 def test_objects_outside_the_depth_range_are_warned_of(z_range_mm: list[float]) -> None:
     recipe = {"analysis": {"z_mm": [540], "z_range_mm": z_range_mm}}
-    found = about("focus", depth_findings(facts(thing("a", 540), thing("b", 539, 544.2), recipe=recipe)))
+    things = thing("a", 540), thing("b", 539, 544.2), thing("floor", 900, is_scored=False)
+    found = about("focus", depth_findings(facts(*things, recipe=recipe)))
     assert found[-1].verdict == "warn"
     assert found[-1].remedy == "analysis.z_range_mm = [539, 545]"
 

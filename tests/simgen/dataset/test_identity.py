@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 import tomli_w
 from pydantic import BaseModel
@@ -31,8 +32,8 @@ SCENE["objects"][1]["material"] = {"reflectance": "dark skin"}
 PLAIN = {"title": "even light", "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}]}
 RECIPE: Table = {
     "scene": "here",
-    "grid": {"rows": 2, "cols": 3, "errors": {}},
-    "sensor": {"camera": "a.csv", "bits": 8},
+    "grid": {"rows": 2, "cols": 3, "height": 4, "width": 5, "errors": {}},
+    "sensor": {"camera": "a.csv", "bits": 8, "hot_pixels": "a.npy"},
     "photons": {"budget": 500.0, "nested": [100.0, 200.0]},
     "analysis": {"z_mm": [500.0], "z_range_mm": [400.0, 700.0]},
 }
@@ -55,6 +56,7 @@ def near(tmp_path: Path) -> Path:
     (tmp_path / "here").mkdir()
     for name in ("a.png", "a.ply", "a.exr"):
         (tmp_path / "here" / name).write_bytes(b"nobody decodes this, and every byte counts")
+    np.save(tmp_path / "a.npy", np.ones((4, 5)))
     (tmp_path / "a.csv").write_text("wavelength_nm,R,G,B\n400,0,0,1\n550,0,1,0\n700,1,0,0\n")
     return tmp_path
 
@@ -103,6 +105,10 @@ def test_a_scenes_values_are_part_of_the_identity_and_terms_of_use_are_not(near:
     before = identity(near, RECIPE, SCENE)
     assert identity(near, changed(RECIPE, "publication.licence", "CC0-1.0")) == before
     assert identity(near, RECIPE, SCENE | {"title": "other words"}) != before
+    unscored = SCENE | {"objects": [thing | {"scored": False} for thing in SCENE["objects"]]}
+    seeds = {prepare(Recipe.model_validate(RECIPE), near).seed}
+    assert identity(near, RECIPE, unscored) != before
+    assert seeds == {prepare(Recipe.model_validate(RECIPE), near).seed}  # of the same photons
     lamp = SCENE["lights"][0] | {"luminance_cd_m2": 100.1}
     assert identity(near, RECIPE, SCENE | {"lights": [lamp]}) != before
 
@@ -118,8 +124,12 @@ def test_every_byte_of_a_scenes_files_is_part_of_the_identity(near: Path) -> Non
         file.write_bytes(whole)
     (near / "here" / "unnamed.png").write_bytes(b"that the scene does not name")
     assert identity(near, RECIPE) == before
+    np.save(near / "a.npy", np.ones((4, 5), np.float32))
+    assert identity(near, RECIPE) == before
+    np.save(near / "a.npy", np.eye(4, 5))
+    other = identity(near, RECIPE)
     (near / "a.csv").write_text((near / "a.csv").read_text().replace("550,0,1,0", "550,0,1,0.01"))
-    assert identity(near, RECIPE) != before
+    assert len({before, other, identity(near, RECIPE)}) == 3
 
 
 @pytest.mark.parametrize("package", ["photon-integral-imaging", "mitsuba"])

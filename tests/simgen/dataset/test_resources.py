@@ -42,6 +42,7 @@ def test_what_does_not_fit_is_named_by_its_field(values: dict[str, Any], field: 
     sentence = shortage(recipe(**values), plan, ROOM)
     assert sentence is not None
     assert sentence.startswith(field)
+    assert (shortage(recipe(), THINS, ROOM, map_counts=1e8) or "").startswith("sensor.hot_pixels")
     assert "this machine has 8 GB available" in sentence
 
 

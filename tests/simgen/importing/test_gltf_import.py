@@ -375,7 +375,11 @@ def test_parts_of_a_mesh_are_objects_named_by_their_materials(tmp_path: Path) ->
     ]
     draft.node(mesh=mesh, name="table.001")
     draft.node(mesh=mesh, name="table.001", translation=[0, 0, -1])
-    scene, left_out = imported(draft, tmp_path, place_at_mm=(0.0, 0.0, 900.0))
+    place: dict[str, Any] = {"place_at_mm": (0.0, 0.0, 900.0)}
+    with pytest.raises(InputError, match="no object 'table-001'; it has table-001-oak, table-001-steel, "):
+        imported(draft, tmp_path, unscored=["table-001"], **place)
+    scene, left_out = imported(draft, tmp_path, unscored=["table-001-4", "table-001-oak-2"], **place)
+    assert [thing.scored for thing in scene.objects] == [True, True, False, False, True, True]
     names = [thing.name for thing in scene.objects]
     assert names == [
         *("table-001-oak", "table-001-steel", "table-001-4"),

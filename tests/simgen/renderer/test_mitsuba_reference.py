@@ -168,8 +168,10 @@ def test_objects_lights_and_a_level_of_the_scene_stand_beside_the_file(folder: P
 
 @pytest.mark.renders
 def test_ids_of_the_file_and_objects_of_the_scene_do_not_mix(folder: Path) -> None:
-    scene = scene_of(folder, CAMERA + ROOM.replace('"back"', '"object1"'), objects=[BALL])
+    values = {"objects": [BALL | {"scored": False}], "mitsuba": {"file": "scene.xml", "unscored": ["lamp"]}}
+    scene = scene_of(folder, CAMERA + ROOM.replace('"back"', '"object1"'), **values)
     _, truth = simgen.draw_photons(scene, GRID, budget=100, cfa=None)
+    assert {truth.names[number] for number in truth.unscored} == {"ball", "lamp"}
     assert truth.names[int(truth.object_id[SIDE // 2, SIDE // 2])] == "ball"
     assert truth.names[int(truth.object_id[0, 0])] == "object1"
     with pytest.raises(InputError, match="both named 'back'"):
@@ -195,7 +197,7 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
         ('<bsdf type="../../evil"/>', "outside the scene's folder"),
         ('<bsdf type="a.b"/>', "no name of a plugin"),
         ('<default name="d" value="."/>' + OBJ % "$d$d/secret.obj", "outside the scene's folder"),
-        (OBJ % "linked.obj", "outside the scene's folder"),
+        (OBJ % "linked.obj", "lies outside the folder"),
         (OBJ % "no.obj", "there is no file"),
         ('<include filename="scene.xml"/><include filename="scene.xml"/>', "deep"),
         ("<broken", "not valid XML"),
@@ -230,10 +232,15 @@ def test_what_mitsuba_refuses_is_one_sentence(tmp_path: Path) -> None:
             simgen.render(scene_of(tmp_path, content), GRID, samples_per_pixel=1)
 
 
+@pytest.mark.renders
 def test_an_import_copies_what_the_file_names(folder: Path) -> None:
     scene_of(folder, CAMERA + ROOM + GLOSSY)
-    imported = simgen.import_scene(folder / "scene.xml", folder / "copy", unit="mm", fit_mm=200.0)
+    place: dict[str, Any] = {"unit": "mm", "fit_mm": 200.0}
+    with pytest.raises(InputError, match="no object 'table'; it has floor, back, lamp, ball, one, two"):
+        simgen.import_scene(folder / "scene.xml", folder / "copy", unscored=["table"], **place)
+    imported = simgen.import_scene(folder / "scene.xml", folder / "copy", unscored=["floor", "back"], **place)
     assert imported.files == ("scene.xml", "picture.png")
     scene = simgen.load_scene(folder / "copy")
     assert scene.mitsuba is not None
     assert (scene.mitsuba.unit_mm, scene.mitsuba.fit_mm) == (1.0, 200.0)
+    assert scene.mitsuba.unscored == ("floor", "back")

@@ -1,15 +1,17 @@
 """What a sensor loses, adds and cuts off: exact small cases, and statistics whose planted fault is caught."""
 
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from pcii.base.errors import InputError
 from pcii.types.bayer import colour_index, mosaic
 from pcii.types.camera_grid import CameraGrid
-from simgen.sensor.detector import detect, full_light_image, read_out
-from simgen.sensor.photon_table import NO_OBJECT, PhotonTable
+from simgen.sensor.detector import dark_map, detect, full_light_image, read_out
+from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, no_photons
 from simgen.spec.recipe import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)
@@ -155,6 +157,61 @@ def test_hot_pixels_are_the_same_in_every_view() -> None:
     assert (another != hot[0, 0]).any(axis=(2, 3)).all()  # the fault: every view has its own
 
 
+def departs(counts: np.ndarray, means: np.ndarray) -> bool:
+    """Whether these are no Poisson numbers of these means, by 5 standard errors of their mean square."""
+    errors = np.sqrt((2 + 1 / means).sum())
+    return bool(abs(((counts - means) ** 2 / means - 1).sum()) > 5 * errors)
+
+
+@pytest.mark.parametrize("is_of_each_camera", [True, False])
+def test_a_map_of_dark_counts_is_drawn_pixel_by_pixel(is_of_each_camera: bool, tmp_path: Path) -> None:
+    """Of a median of 1 count, and 3 % of the pixels 10 to 1000 times noisier."""
+    grid, rng = films(2, 3, 40, 40), np.random.default_rng(1)
+    shape = grid.shape_KLHW if is_of_each_camera else grid.shape_HW
+    tail = np.where(rng.random(shape) < 0.03, 10 ** rng.uniform(1, 3, shape), 1.0)
+    np.save(tmp_path / "map.npy", (rng.lognormal(0, 0.3, shape) * tail).astype(np.float32))
+    sensor = Sensor(hot_pixels="map.npy", frames=50, bits=1)
+    means = dark_map(sensor, grid, tmp_path)
+    assert means is not None
+    dark = detect(no_photons(), grid, None, sensor, 1, means)
+    counts, of_views = counted(dark, grid), np.broadcast_to(means, grid.shape_KLHW)
+    sums, means_of_sums = counts.sum((0, 1)), of_views.sum((0, 1))
+    assert not departs(counts, of_views)
+    assert not departs(sums, means_of_sums)
+    assert abs(sums.sum() - of_views.sum()) < 4 * np.sqrt(of_views.sum())
+    assert departs(counts, of_views.swapaxes(2, 3))  # the fault: a map with rows for columns
+    assert departs(6 * counts[0, 0], means_of_sums)  # the fault: one draw for all views
+    assert (dark.columns()["object_id"] == NO_OBJECT).all()
+    # In binary frames they stop as photons do: binomial, with a variance of at most 50 / 4.
+    bits = counted(read_out(dark, grid, sensor, 2), grid)
+    expected = 50 * -np.expm1(-of_views / 50)
+    assert abs((bits - expected).mean()) < 4 * np.sqrt((expected * (1 - expected / 50)).mean() / bits.size)
+
+
+MAP = np.zeros((50, 60))
+OBJECTS = np.full((50, 60), None)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (MAP.T, r"map.npy: expected mean dark counts \(H, W\) = \(50, 60\), or .* got \(60, 50\)"),
+        (MAP - 1e-9, "finite numbers from 0"),
+        (MAP + np.nan, "finite numbers from 0"),
+        (MAP + np.inf, "finite numbers from 0"),
+        (MAP + 0j, "finite numbers from 0"),
+        (OBJECTS, "not an array of numbers in a .npy file"),  # which pickles would be read for
+    ],
+)
+def test_a_map_that_is_none_is_refused(tmp_path: Path, values: np.ndarray, words: str) -> None:
+    np.save(tmp_path / "map.npy", values)
+    with pytest.raises(InputError, match=words):
+        dark_map(Sensor(hot_pixels="map.npy"), GRID, tmp_path)
+    (tmp_path / "below").mkdir()
+    with pytest.raises(InputError, match=r"sensor.hot_pixels: '../map.npy' lies outside the folder"):
+        dark_map(Sensor(hot_pixels="../map.npy"), GRID, tmp_path / "below")
+
+
 def silent(counts: np.ndarray) -> np.ndarray:
     """Pixels (H, W) that count nothing in any view."""
     return counts.sum(axis=(0, 1)) == 0
@@ -234,9 +291,15 @@ GAIN = 20.0
 SIDE = 200
 
 
-def told(radiance: np.ndarray, light: FullLight, cfa: str | None = None, **sensor: object) -> np.ndarray:
+def told(
+    radiance: np.ndarray,
+    light: FullLight,
+    cfa: str | None = None,
+    dark_map: np.ndarray | None = None,
+    **sensor: object,
+) -> np.ndarray:
     settings = Sensor.model_validate({"full_light": light, **sensor})
-    return full_light_image(radiance, cfa, GAIN, settings, np.random.default_rng(1))
+    return full_light_image(radiance, cfa, GAIN, settings, np.random.default_rng(1), dark_map)
 
 
 def even(value: float, channels: int = 1) -> np.ndarray:
@@ -247,7 +310,8 @@ def even(value: float, channels: int = 1) -> np.ndarray:
 def test_mid_light_is_told_as_it_is(cfa: str | None, channels: int) -> None:
     light = np.array([30.0, 50.0, 70.0], dtype=np.float32)
     radiance = even(50.0) if channels == 1 else even(1.0, 3) * light
-    image = told(radiance, FullLight(), cfa, quantum_efficiency=EFFICIENCY).astype(np.float64)
+    dark = np.tile([0.0, 0.0, 90.0, 90.0], (SIDE, SIDE // 4))
+    image = told(radiance, FullLight(), cfa, dark, quantum_efficiency=EFFICIENCY).astype(np.float64)
     assert image.shape == radiance.shape
     efficiency = np.array(EFFICIENCY)
     if channels == 1:
@@ -256,7 +320,7 @@ def test_mid_light_is_told_as_it_is(cfa: str | None, channels: int) -> None:
     gain = np.broadcast_to(efficiency * GAIN, image.shape)
     step_e = 10_000 / 4095
     electrons = image * gain
-    expected = radiance * gain
+    expected = radiance * gain + dark[..., None]
     variance = expected + 2.0**2 + step_e**2 / 12
     for one in np.unique(expected):
         here = expected == one
