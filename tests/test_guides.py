@@ -12,6 +12,7 @@ from unittest.mock import create_autospec
 import numpy as np
 import pytest
 from guide_blocks import PAGES, ROOT, blocks, run_page
+from make_your_own_images import photograph
 from tiny import TINY_RECIPE
 
 import pcii
@@ -85,9 +86,6 @@ def given_plugins(request: pytest.FixtureRequest) -> None:
 
 
 def given_your_own_images(request: pytest.FixtureRequest) -> None:
-    request.getfixturevalue("monkeypatch").setattr(sys, "path", [*sys.path, str(DOCS)])
-    from make_your_own_images import photograph  # pyright: ignore[reportMissingImports]
-
     Path("out/example/photos").mkdir(parents=True)
     cameras = pcii.Optics(pitch_mm=(2, 2), focal_mm=35, sensor_mm=36).grid((5, 5, 480, 640))
     for k, l in np.ndindex(5, 5):

@@ -281,9 +281,9 @@ class PhotonCounts(Drawn):
     def rate(self, k: int, l: int, frames: tuple[int, int] | None = None) -> np.ndarray:
         """Photons per pixel and frame of camera (k, l), estimated from some frames, (H, W) float64.
 
-        `frames` is (first, end), of which `end` is left out; by default all frames. Of S counts in F frames it
-        is -ln(1 - S / F) for one bit, S / F without a limit, and for more bits as in `Readout.photons`; it is
-        infinite where all F frames are full. Raises `InputError` for a camera outside the grid, for frames
+        `frames` is (first, end), of which `end` is left out; by default all frames. Of S counts in F frames
+        it is -ln(1 - S / F) for one bit, S / F without a limit, and for more bits as in `Readout.photons`; it
+        is infinite where all F frames are full. Raises `InputError` for a camera outside the grid, for frames
         outside the exposure, and for a part of them where only the sums over all were stored.
 
         >>> grid = CameraGrid(
