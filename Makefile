@@ -48,7 +48,7 @@ llvm: $(VENV)/.ready
 	$(BIN)/simgen doctor
 
 demo: llvm
-	$(BIN)/simgen generate data_recipes/paper.toml --out $(OUT)/paper
+	$(BIN)/simgen generate paper --out $(OUT)/paper
 	$(BIN)/pcii run $(OUT)/paper --out $(OUT)/paper-results
 	@echo "Open $(OUT)/paper-results/report.html in a browser."
 
