@@ -11,6 +11,7 @@
 # make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours. Goes on
 #             from where it was stopped
 # make docs   the site of docs/*.md and the API, in out/docs
+# make notebooks  the outputs of examples/notebooks anew, by running them
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
 PYTHON ?= python3
@@ -19,7 +20,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 TRAIN_MINUTES ?= 90
 
-.PHONY: demo test check-docs stress bench bench-full bench-guard bench-publish bench-setup train docs gallery format clean llvm
+.PHONY: demo test check-docs stress bench bench-full bench-guard bench-publish bench-setup train docs notebooks gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 # What the commands need, and beside it what the tests need.
@@ -47,7 +48,7 @@ llvm: $(VENV)/.ready
 	$(BIN)/simgen doctor
 
 demo: llvm
-	$(BIN)/simgen generate data_recipes/paper.toml --out $(OUT)/paper
+	$(BIN)/simgen generate paper --out $(OUT)/paper
 	$(BIN)/pcii run $(OUT)/paper --out $(OUT)/paper-results
 	@echo "Open $(OUT)/paper-results/report.html in a browser."
 
@@ -101,6 +102,9 @@ docs: $(VENV)/.ready
 	$(BIN)/python -m sphinx -q -E -W --keep-going -b html docs $(OUT)/docs
 	$(BIN)/python docs/check_links.py $(OUT)/docs
 	@echo "Open $(OUT)/docs/index.html in a browser."
+
+notebooks: llvm $(VENV)/.ready-dev
+	$(BIN)/python docs/make_notebooks.py
 
 gallery: llvm
 	$(BIN)/python docs/make_gallery.py

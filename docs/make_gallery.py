@@ -15,8 +15,8 @@ DOTS_PER_INCH = 62
 
 HEAD = """# Scenes
 
-What ships in `scenes/`: `simgen check NAME` and `simgen preview NAME -o look.png` take a scene by its name,
-`simgen generate data_recipes/NAME.toml -o out/NAME` makes the data of a recipe. Each scene.toml has comments
+What ships in `scenes/`: `simgen check NAME` and `simgen preview NAME -o NAME.png` take a scene by its name,
+`simgen generate NAME -o out/NAME` makes the data of a recipe. Each scene.toml has comments
 to learn from. Pictures from the virtual centre of the paper's camera grid; the frame in the left one is what
 the others show enlarged. All of
 this page is made by `make gallery`.

@@ -1,6 +1,6 @@
 """Draw docs/overview.jpg, from photons to depth on the paper's scene: `python docs/make_overview.py DATASET`.
 
-DATASET is what `simgen generate data_recipes/paper.toml -o DATASET --set products.radiance=none` makes.
+DATASET is what `simgen generate paper -o DATASET --set products.radiance=none` makes.
 """
 
 import sys

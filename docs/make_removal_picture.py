@@ -1,6 +1,6 @@
 """Draw docs/removal.jpg, each step on the paper's scene: `python docs/make_removal_picture.py DATASET`.
 
-DATASET is what `simgen generate data_recipes/paper.toml -o DATASET` makes.
+DATASET is what `simgen generate paper -o DATASET` makes.
 """
 
 import sys

@@ -6,7 +6,7 @@ from pathlib import Path
 import pcii
 import simgen
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/example")
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/small-nested")
 recipe = simgen.load_recipe("small", ["photons.nested=[1000]", "products.radiance=none"])
 manifest = simgen.generate(recipe, folder)
 print(f"{manifest['photons']['total']} photons by {manifest['photons']['method']}")

@@ -1,17 +1,20 @@
 """The pages do what they say: their Python and their `sh` blocks run, from top to bottom."""
 
+import re
 import shutil
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
 from guide_blocks import PAGES, ROOT, blocks, run_page
+from make_your_own_images import photograph
+from pydantic import BaseModel
 from tiny import TINY_RECIPE
 
 import pcii
@@ -85,9 +88,6 @@ def given_plugins(request: pytest.FixtureRequest) -> None:
 
 
 def given_your_own_images(request: pytest.FixtureRequest) -> None:
-    request.getfixturevalue("monkeypatch").setattr(sys, "path", [*sys.path, str(DOCS)])
-    from make_your_own_images import photograph  # pyright: ignore[reportMissingImports]
-
     Path("out/example/photos").mkdir(parents=True)
     cameras = pcii.Optics(pitch_mm=(2, 2), focal_mm=35, sensor_mm=36).grid((5, 5, 480, 640))
     for k, l in np.ndindex(5, 5):
@@ -172,6 +172,36 @@ def test_the_recipes_of_the_guide_are_valid() -> None:
     whole, sweep = (block.text for block in blocks(DOCS / "recipes.md") if block.language == "toml")
     assert Recipe.model_validate(tomllib.loads(whole)).photons.nested == (100, 300)
     assert tomllib.loads(sweep)["photons"]["budget"] == [100, 300, 1000]
+
+
+def tables_of(model: type[BaseModel], name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Each table of a recipe by its dotted name, with the defaults of its keys; ... for what has none."""
+    defaults = {}
+    for key, field in model.model_fields.items():
+        kinds = [field.annotation, *get_args(field.annotation)]
+        inner = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)]
+        for kind in inner:
+            yield from tables_of(kind, f"{name}.{key}".lstrip("."))
+        if not inner:
+            defaults[key] = ... if field.is_required() else field.default
+    yield name, defaults
+
+
+def test_the_guide_to_recipes_has_every_key_with_its_default() -> None:
+    _, *sections = re.split(r"^### (.+)$", (DOCS / "recipes.md").read_text(), flags=re.MULTILINE)
+    written = {}
+    for heading, text in zip(sections[::2], sections[1::2], strict=True):
+        rows = re.findall(r"^\| `(\w+)` \|[^|]+\| (?:`(.+?)`|(\w+)) \|", text, re.MULTILINE)
+        values = {"required": ..., "none": None}
+        written[heading.strip("`[]").removeprefix("The recipe itself")] = {
+            key: values[word] if word else tomllib.loads(f"value = {value}")["value"]
+            for key, value, word in rows
+        }
+    listed = {
+        name: {key: [*value] if isinstance(value, tuple) else value for key, value in defaults.items()}
+        for name, defaults in tables_of(Recipe)
+    }
+    assert written == listed
 
 
 def test_the_terms_of_the_guide_to_exchange_are_valid() -> None:

@@ -25,7 +25,7 @@ benchmark = App(
 
     Examples of use:
 
-        pcii benchmark run three-step --data out/bench -o submissions/three-step
+        pcii benchmark run three-step --data out/pcii-bench-1 -o submissions/three-step
         pcii benchmark page submissions -o benchmark.html
     """,
 )
@@ -45,8 +45,8 @@ def run(
 
     Examples of use:
 
-        pcii benchmark run three-step --data out/bench -o out/three-step
-        pcii benchmark run my_method.py:remove --data out/bench --half development -o out/my-removal
+        pcii benchmark run three-step --data out/pcii-bench-1 -o out/three-step
+        pcii benchmark run my_method.py:remove --data out/pcii-bench-1 --half development -o out/my-removal
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def score(
 
     Example of use:
 
-        pcii benchmark score my-results --data out/bench -o out/mine
+        pcii benchmark score my-results --data out/pcii-bench-1 -o out/my-scores
 
     Parameters
     ----------

@@ -61,8 +61,8 @@ def evaluate(
 
     Examples of use:
 
-        pcii evaluate out/twenty -o out/compared
-        pcii evaluate out/twenty out/slats -o out/compared --method depth:focus --budget 300 --workers 2
+        pcii evaluate out/paper20 -o out/compared
+        pcii evaluate out/paper20 out/slats20 -o out/compared --method depth:focus --budget 300 --workers 2
 
     Parameters
     ----------

@@ -55,11 +55,12 @@ def import_dataset(
 
     Examples of use:
 
-        pcii import photos -o out/mine --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 --sensor-mm 36
-        pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
+        pcii import photos -o out/photos --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
+          --sensor-mm 36
+        pcii import photos -o out/photos-dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
           --sensor-mm 36 --cfa GRBG --photons 1000 --z-range-mm 30 200
         pcii import cotton -o out/cotton
-        pcii import frames.npy -o out/spad --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
+        pcii import frames.npy -o out/counts --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def run(
     Examples of use:
 
         pcii run out/paper -o out/paper-results
-        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood --z-range-mm 450 750
+        pcii run out/paper -o out/paper-stack --z-mm 500:700:20 --method likelihood --z-range-mm 450 750
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def reconstruct(
 
     Example of use:
 
-        pcii reconstruct out/paper --z-mm 500:700:20 -o out/sections
+        pcii reconstruct out/paper --z-mm 500:700:20 -o out/paper-sections
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def depth(
 
     Example of use:
 
-        pcii depth out/paper --method focus --z-range-mm 450 750 -o out/depth
+        pcii depth out/paper --method focus --z-range-mm 450 750 -o out/paper-depth
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def segment(
 
     Example of use:
 
-        pcii segment out/paper --z-mm 540 --method three-step -o out/removed
+        pcii segment out/paper --z-mm 540 --method three-step -o out/paper-removed
 
     Parameters
     ----------

@@ -84,8 +84,8 @@ def evaluate(
     Traceback (most recent call last):
     pcii.base.errors.InputError: out/no-such-dataset: there is no such dataset folder
 
-    With datasets of `simgen generate RECIPE -o out/twenty --seeds 20`, the IoU of each of them is
-    `evaluate(["out/twenty"], "out/compared").frame.groupby(["dataset", "light", "method"]).iou.mean()`.
+    With datasets of `simgen generate paper -o out/paper20 --seeds 20`, the IoU of each of them is
+    `evaluate(["out/paper20"], "out/compared").frame.groupby(["dataset", "light", "method"]).iou.mean()`.
     """
     folder = Path(out)
     named = named_methods(methods)

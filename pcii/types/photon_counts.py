@@ -278,6 +278,35 @@ class PhotonCounts(Drawn):
         image[events.i[of_view], events.j[of_view]] = events.n[of_view]
         return image
 
+    def rate(self, k: int, l: int, frames: tuple[int, int] | None = None) -> np.ndarray:
+        """Photons per pixel and frame of camera (k, l), estimated from some frames, (H, W) float64.
+
+        `frames` is (first, end), of which `end` is left out; by default all frames. Of S counts in F frames
+        it is -ln(1 - S / F) for one bit, S / F without a limit, and for more bits as in `Readout.photons`; it
+        is infinite where all F frames are full. Raises `InputError` for a camera outside the grid, for frames
+        outside the exposure, and for a part of them where only the sums over all were stored.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=1, width=2
+        ... )
+        >>> pixels = dict(k=[0, 0], l=[0, 0], i=[0, 0], j=[0, 1], n=[1, 2])
+        >>> counts = PhotonCounts.from_events(**pixels, grid=grid, frames=4, bits=1, frame=[3, 0, 1])
+        >>> counts.rate(0, 0).round(3).tolist(), counts.rate(0, 0, frames=(0, 2)).tolist()
+        ([[0.288, 0.693]], [[0.0, inf]])
+        """
+        image, number = self.view(k, l), self.readout.frames
+        first, end = (0, number) if frames is None else _checked_range(frames, number)
+        if end - first < number:
+            if self.frame is None:
+                raise InputError(f"frames: only the sums over all {number} frames were stored")
+            before = self.events.n[: self.view_starts[k * self.grid.cols + l]].sum()
+            in_range = self.frame[before : before + image.sum()]
+            pixels = np.arange(image.size).repeat(image.ravel())
+            pixels = pixels[(first <= in_range) & (in_range < end)]
+            image = np.bincount(pixels, minlength=image.size).reshape(image.shape)
+        readout = Readout(end - first, self.readout.bits)
+        return readout.photons(image, np.ones_like(image)) / readout.frames
+
     @cached_property
     def total(self) -> int:
         """Number of photons of all views."""
@@ -318,6 +347,13 @@ def _check_sensor(grid: object, cfa: str | None) -> None:
     if not isinstance(grid, CameraGrid):
         raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
     check_cfa(cfa)
+
+
+def _checked_range(frames: object, number: int) -> tuple[int, int]:
+    match frames:
+        case (first, end) if is_whole(first) and is_whole(end) and 0 <= first < end <= number:
+            return first, end
+    raise InputError(f"frames: expected (first, end) with 0 <= first < end <= {number}, got {frames!r}")
 
 
 def _rate_of_bits(number: np.ndarray, trials: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ benchmark = App(
 
     Example of use:
 
-        simgen benchmark make -o out/bench
+        simgen benchmark make -o out/pcii-bench-1
     """,
 )
 app.command(benchmark)
@@ -95,8 +95,8 @@ def generate(
 
     Examples of use:
 
-        simgen generate data_recipes/paper.toml -o out/paper
-        simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
+        simgen generate paper -o out/paper
+        simgen generate paper -o out/paper-dim --set photons.budget=100 --set seed=3
         simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
         simgen generate drawn_crossing -o out/crossings --scenes 1000
 
@@ -152,9 +152,9 @@ def make(
 
     Examples of use:
 
-        simgen benchmark make -o out/bench
-        simgen benchmark make -o out/bench --half development --workers 2
-        simgen benchmark make -o out/bench --scene ball-and-bird --scene foliage
+        simgen benchmark make -o out/pcii-bench-1
+        simgen benchmark make -o out/pcii-bench-1 --half development --workers 2
+        simgen benchmark make -o out/pcii-bench-1 --scene ball-and-bird --scene foliage
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def sheet(dataset: Path, *, out: Out) -> None:
 
     Example of use:
 
-        simgen sheet out/paper -o paper.png
+        simgen sheet out/paper -o sheet.png
 
     Parameters
     ----------

@@ -119,8 +119,8 @@ def preview(
 
     Examples of use:
 
-        simgen preview two_objects -o look.png
-        simgen preview drawn_room --scene 17 -o look.png
+        simgen preview two_objects -o two_objects.png
+        simgen preview drawn_room --scene 17 -o drawn_room.png
 
     Parameters
     ----------

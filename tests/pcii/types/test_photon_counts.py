@@ -224,6 +224,26 @@ def test_frames_follow_their_events() -> None:
     assert some.readout == counts.readout
 
 
+@pytest.mark.parametrize("span", [(0, 1), (3, 9), (11, 12), (0, 12)])
+def test_rates_of_a_range_of_frames_are_those_of_its_bits(span: tuple[int, int]) -> None:
+    bits = np.random.default_rng(5).random((*FILM.shape_KLHW, 12)) < 0.4
+    *pixels, frame = np.nonzero(bits)
+    n = np.ones(frame.size, int)
+    counts = PhotonCounts.from_events(*pixels, n, FILM, frames=12, bits=1, frame=frame)
+    sums = PhotonCounts.from_dense(bits.sum(axis=-1), FILM, frames=12, bits=1)
+    for k, l in np.ndindex(2, 2):
+        with np.errstate(divide="ignore"):
+            expected = -np.log(1 - bits[k, l, ..., slice(*span)].mean(axis=-1))
+        np.testing.assert_allclose(counts.rate(k, l, frames=span), expected, rtol=1e-14, atol=1e-15)
+        if span == (0, 12):
+            np.testing.assert_allclose(sums.rate(k, l), expected, rtol=1e-14, atol=1e-15)
+        else:
+            with pytest.raises(InputError, match="only the sums over all 12 frames"):
+                sums.rate(k, l, frames=span)
+    with pytest.raises(InputError, match="first < end <= 12"):
+        counts.rate(0, 0, frames=(span[0], 13))
+
+
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
