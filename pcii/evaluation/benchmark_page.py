@@ -11,7 +11,7 @@ from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.pages import accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
-from pcii.evaluation.submissions import SUBMISSION, read_scores
+from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks
 from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
 from pcii.store.collection import IN_FRAMES
@@ -68,7 +68,7 @@ def write_page(folder: Path, out: Path) -> int:
     submissions: dict[Path, dict[str, Any]] = {}
     for file in sorted(folder.glob(f"*/{SUBMISSION}")):
         verify_scores(file.parent, MAX_BYTES)
-        submissions[file.parent] = read_scores(file.parent)
+        submissions[file.parent] = read_as(ScoredSubmission, file.parent).model_dump(exclude_none=True)
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
     for name in ("benchmark", "half"):

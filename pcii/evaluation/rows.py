@@ -36,7 +36,7 @@ HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
 MAX_COLUMNS = 300
-"""Largest number of columns of the frame, some three times what the measures need; each takes 10 ms."""
+"""Some three times what the measures need; a page takes 10 ms for each."""
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -82,26 +82,22 @@ def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
 
 def _measures(scores: Any) -> Any:
     """Scores by their dotted names; raises ValueError for a name of another column of the frame."""
-    if not isinstance(scores, dict):
-        return scores
-    measures = dict(_leaves(scores)) if any(isinstance(each, dict) for each in scores.values()) else scores
-    if not NO_MEASURES.isdisjoint(measures):
-        raise ValueError(f"{min(NO_MEASURES & measures.keys())!r} is no name of a measure")
-    return measures
+    measures = dict(_leaves(scores)) if isinstance(scores, dict) else {}
+    if names := NO_MEASURES & measures.keys():
+        raise ValueError(f"{min(names)!r} is no name of a measure")
+    return measures or scores
 
 
 def _plane_parts(plane: Any) -> Any:
     """A plane with its scores apart."""
-    if not isinstance(plane, dict):
-        return plane
-    scores = plane.copy()
+    scores = dict(plane)
     parts = {name: scores.pop(name) for name in ("z_mm", "object", "truth") if name in scores}
     return parts | {"scores": scores}
 
 
 @cache
-def _row_models() -> "tuple[TypeAdapter[Any], TypeAdapter[Any]]":
-    """Models of rows of planes and of depth, made when the first is read: pydantic is slow to load."""
+def _row_model() -> "TypeAdapter[Any]":
+    """The model of a row, made when the first is read: pydantic is slow to load."""
     from pydantic import BeforeValidator, Field, TypeAdapter
     from typing_extensions import TypedDict
 
@@ -116,7 +112,7 @@ def _row_models() -> "tuple[TypeAdapter[Any], TypeAdapter[Any]]":
         truth: Literal["object", "pixel"]
         scores: Annotated[dict[str, float | None], by_names]
 
-    class Head(TypedDict):
+    class RowModel(TypedDict):
         __pydantic_config__ = OPEN  # type: ignore[misc]
         dataset: Text
         identity: Text
@@ -132,15 +128,11 @@ def _row_models() -> "tuple[TypeAdapter[Any], TypeAdapter[Any]]":
         software: NotRequired[dict[str, Text] | None]
         date: NotRequired[Text]
         machine: NotRequired[Text]
-
-    class OfPlanes(Head):
-        planes: Annotated[list[Annotated[Plane, BeforeValidator(_plane_parts)]], Field(min_length=1)]
-
-    class OfDepth(Head):
-        depth: Annotated[dict[str, float | None], by_names]
         bound_px: NotRequired[float | None]
+        depth: NotRequired[Annotated[dict[str, float | None], by_names]]
+        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
 
-    return TypeAdapter(OfPlanes), TypeAdapter(OfDepth)
+    return TypeAdapter(RowModel)
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
@@ -183,10 +175,7 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
 
 def read_rows(out: Path) -> list[Row]:
     """The last row of each key in a folder; `InputError` if there are none, and for a line that is no row."""
-    try:
-        rows = _parsed(out, (out / ROWS).read_bytes())
-    except FileNotFoundError:
-        rows = {}
+    rows = _parsed(out, (out / ROWS).read_bytes()) if (out / ROWS).is_file() else {}
     if not rows:
         raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one")
     return list(rows.values())
@@ -202,10 +191,12 @@ def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
     for number, line in enumerate(lines, start=1):
         try:
             row = json.loads(line)
-            _row_models()["depth" in row].validate_python(row)
+            _row_model().validate_python(row)
+            if not (row.get("depth") or row.get("planes")):
+                raise ValueError("no scores")
             rows[key_of(row)] = row
         except (ValueError, TypeError, RecursionError) as fault:
-            words = first_fault(fault) if isinstance(fault, ValidationError) else "is no JSON object of a row"
+            words = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
             advice = "delete that line and repeat the command that made it"
             raise InputError(f"{out / ROWS}: line {number}: {words}; {advice}") from None
     return rows
@@ -217,10 +208,7 @@ def read_frame(out: str | Path) -> "DataFrame":
 
 
 def frame_of(rows: Sequence[Row]) -> "DataFrame":
-    """The frame of rows, whose columns the docstring of this module explains; scenes in their order.
-
-    Raises `InputError` for rows with other measures by the hundred.
-    """
+    """The frame of rows, whose columns the docstring of this module explains; scenes in their order."""
     import pandas as pd
 
     labels = _labels(rows)

@@ -12,7 +12,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
@@ -35,8 +35,6 @@ MIN_MM, MAX_MM = 1e-3, 1e12
 """Nearest and farthest depth of an answer: errors of others overflow."""
 MAX_OVERHEAD_BYTES = 1 << 16
 """Size of a submission.json at most, and of what an .npz file has beside its numbers."""
-MAX_NUMBER_BYTES = 16
-"""Those of a long double."""
 Text = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -61,39 +59,31 @@ class ScoredSubmission(Submission):
     command_name: Text | None = None
 
 
-AnySubmission = TypeVar("AnySubmission", bound=Submission)
-
-
 def read_submission(folder: Path, benchmark: str) -> Submission:
     """What submission.json says; `InputError` if it is missing, wrong, or of another benchmark."""
-    submission, file = _read_as(Submission, folder), folder / SUBMISSION
+    submission, file = read_as(Submission, folder), folder / SUBMISSION
     if submission.benchmark != benchmark:
         raise InputError(f"{file}: benchmark: is {submission.benchmark!r}, but the data are of {benchmark!r}")
     named_method((submission.method, _read_as_maps))  # raises `InputError` for a name that is taken
     return submission
 
 
-def read_scores(folder: Path) -> dict[str, Any]:
-    """What submission.json says in a folder of scores; raises `InputError` if it is missing or wrong."""
-    return _read_as(ScoredSubmission, folder).model_dump(exclude_none=True)
-
-
-def _read_as(model: type[AnySubmission], folder: Path) -> AnySubmission:
+def read_as(model: type[Submission], folder: Path) -> Submission:
+    """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
     file = folder / SUBMISSION
     _check_file(folder, file, MAX_OVERHEAD_BYTES)
     try:
         return model.model_validate_json(file.read_bytes())
     except ValidationError as fault:
-        names = ", ".join(model.model_fields)
-        raise InputError(f"{file}: {first_fault(fault)}; expected a JSON object of {names}") from None
+        expected = f"expected a JSON object of {', '.join(model.model_fields)}"
+        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None
 
 
 def _check_file(folder: Path, file: Path, max_bytes: int) -> None:
     """Raise `InputError` for what is no file of this folder, or a larger one."""
-    if not (file.is_file() and file.resolve().is_relative_to(folder.resolve())):
-        raise InputError(f"{file}: expected a file in this folder; it is missing, a link, or no file")
-    if file.stat().st_size > max_bytes:
-        raise InputError(f"{file}: larger than the {max_bytes} bytes that such a file has at most")
+    is_inside = file.is_file() and file.resolve().is_relative_to(folder.resolve())
+    if not is_inside or file.stat().st_size > max_bytes:
+        raise InputError(f"{file}: expected a file of this folder, no link, of at most {max_bytes} bytes")
 
 
 def _read_as_maps(*_: Any) -> Any:
@@ -151,8 +141,7 @@ def _read_depth(folder: Path, file: Path, shape: tuple[int, int]) -> DepthMap:
     has_answer = np.isfinite(arrays["z_mm"])
     z_mm = np.where(has_answer, arrays["z_mm"], np.nan).astype(np.float64)
     if ((z_mm < MIN_MM) | (z_mm > MAX_MM)).any():
-        span = f"from {MIN_MM:g} to {MAX_MM:g} mm"
-        raise InputError(f"{file}: z_mm: depths are {span}; give NaN where there is no answer")
+        raise InputError(f"{file}: z_mm: expected {MIN_MM:g} to {MAX_MM:g} mm, or NaN for no answer")
     confidence = arrays.get("confidence", has_answer)
     if not ((confidence >= 0) & (confidence <= 1)).all():
         raise InputError(f"{file}: confidence: expected numbers from 0 to 1, also where there is no depth")
@@ -161,8 +150,8 @@ def _read_depth(folder: Path, file: Path, shape: tuple[int, int]) -> DepthMap:
 
 def _read_arrays(folder: Path, file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:
     """Arrays of an .npz file with these shapes, the first of which is needed; else raises `InputError`."""
-    numbers = sum(math.prod(shape) for shape in shapes.values())
-    _check_file(folder, file, MAX_OVERHEAD_BYTES + MAX_NUMBER_BYTES * numbers)
+    numbers = sum(map(math.prod, shapes.values()))
+    _check_file(folder, file, MAX_OVERHEAD_BYTES + 16 * numbers)  # those of long doubles
     needed, *_ = shapes
     described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
     expected = f"expected numbers {described}, of which {needed} is needed"
@@ -171,33 +160,31 @@ def _read_arrays(folder: Path, file: Path, shapes: Mapping[str, tuple[int, ...]]
             members = {name.removesuffix(".npy"): name for name in archive.namelist()}
             if unused := members.keys() - shapes:
                 raise InputError(f"{file}: {min(unused)!r} is not used; {expected}")
-            arrays = {name: _read_array(archive, members[name], shapes[name]) for name in members}
+            headers = {name: _header(archive, member) for name, member in members.items()}
+            if needed not in headers or any(headers[name] != (shapes[name], True) for name in headers):
+                raise InputError(f"{file}: {expected}")
+            return {name: _read_array(archive, members[name]) for name in members}
     except InputError:
         raise
     except Exception:  # damaged archives and headers raise various exceptions
         raise InputError(f"{file}: damaged, or no .npz file as numpy.savez writes it") from None
-    arrays = {name: array for name, array in arrays.items() if array is not None}
-    if len(arrays) < len(members) or needed not in arrays:
-        raise InputError(f"{file}: {expected}")
-    return arrays
 
 
-def _read_array(archive: ZipFile, name: str, shape: tuple[int, ...]) -> np.ndarray | None:
-    """An array of an archive; None if it is none of numbers with this shape.
-
-    Its header is read first, since memory is taken as the header says. Other compression than that of NumPy
-    can unpack a few bytes to gigabytes in one step.
-    """
+def _header(archive: ZipFile, name: str) -> tuple[tuple[int, ...], bool]:
+    """Shape of an array, for which memory is taken when it is read, and whether it is of real numbers."""
+    # Other methods than those of NumPy unpack a few bytes to gigabytes in one step.
     if archive.getinfo(name).compress_type not in (ZIP_STORED, ZIP_DEFLATED):
         raise ValueError("compressed by another method")
     with archive.open(name) as member:
-        if npy_format.read_magic(member) != (1, 0):  # in others headers may have gigabytes
+        if npy_format.read_magic(member) != (1, 0):  # headers of other versions may have gigabytes
             raise ValueError("a header for more than numbers")
-        stored_shape, _, dtype = npy_format.read_array_header_1_0(member)
-    if stored_shape != shape or dtype.kind not in "fiub":
-        return None
+        shape, _, dtype = npy_format.read_array_header_1_0(member)
+    return shape, dtype.kind in "fiub"
+
+
+def _read_array(archive: ZipFile, name: str) -> np.ndarray:
     with archive.open(name) as member:
         array = npy_format.read_array(member, allow_pickle=False)
-        if member.read(1):  # and at its end the checksum is compared
+        if member.read(1):  # at the end the checksum is compared
             raise ValueError("more than an array")
     return array

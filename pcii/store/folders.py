@@ -31,7 +31,7 @@ ROWS = "rows.jsonl"
 EVALUATION = "evaluation.json"
 LOCK = ".lock"
 """Locked while a run writes to the folder of a collection, and then removed."""
-REMEDY = "delete the folder and make it again"
+REMEDY = "delete the folder and make or score it again"
 """How errors about damaged files end."""
 _NO_CHECKSUM = "0" * 64
 
@@ -72,9 +72,7 @@ def lists_part(files: Iterable[str], part: str) -> bool:
     return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
-def check_file(
-    root: Path, name: str, entry: Mapping[str, Any], *, content: bool = True, remedy: str = REMEDY
-) -> None:
+def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool = True) -> None:
     """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
     path = root / name
     try:
@@ -88,7 +86,7 @@ def check_file(
             return
     except OSError as error:
         fault = f"cannot be read ({error.strerror})"
-    raise InputError(f"{path}: {fault}; {remedy}")
+    raise InputError(f"{path}: {fault}; {REMEDY}")
 
 
 def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
@@ -122,7 +120,6 @@ class FolderKind:
     """The command that makes such folders."""
     marks: frozenset[str]
     """Files of which every such folder has one, finished or not."""
-    remedy: str = REMEDY
 
     @property
     def format(self) -> str:
@@ -158,7 +155,7 @@ class FolderKind:
             raise InputError(
                 f"{folder}: not a finished {self.what} (no {self.document}); `{self.command}` makes one"
             )
-        content = read_small(path, LARGEST_DOCUMENT_BYTES, self.remedy)
+        content = read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY)
         try:
             document = json.loads(content)
             checksum = document.pop("sha256").encode()
@@ -169,7 +166,7 @@ class FolderKind:
                 raise ValueError(f"expected a {self.format} of version {self.version}")
             return validated(model, document)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as fault:
-            raise InputError(f"{path}: damaged, or of another release ({fault}); {self.remedy}") from None
+            raise InputError(f"{path}: damaged, or of another release ({fault}); {REMEDY}") from None
 
 
 def entries(folder: Path, what: str) -> set[str]:
@@ -189,9 +186,7 @@ def check_free(folder: Path, what: str) -> None:
 
 
 RESULTS_FOLDER = FolderKind("results", RESULTS, 4, "pcii run", frozenset({RESULTS}))
-EVALUATION_FOLDER = FolderKind(
-    "evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS}), "delete the folder and score it again"
-)
+EVALUATION_FOLDER = FolderKind("evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS}))
 
 
 def read_results(out: Path) -> "ResultsManifest":

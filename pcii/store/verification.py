@@ -1,7 +1,8 @@
 """Comparison of all files of a dataset, a collection, results or an evaluation with its manifest."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from pcii.base.command_line import answer_json, say
 from pcii.base.errors import InputError
@@ -17,12 +18,9 @@ from pcii.store.collection import (
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.folders import (
     EVALUATION,
-    EVALUATION_FOLDER,
     LOCK,
-    REMEDY,
     RESULTS,
     ROWS,
-    Files,
     check_file,
     entries,
     read_evaluation,
@@ -40,31 +38,24 @@ def verify(path: Path, report: Report = silent) -> int:
     """
     if is_collection(path):
         return _verify_collection(path, report)
-    if not (path / MANIFEST).exists():
-        if (path / RESULTS).exists():
-            return _verify_files(path, RESULTS, read_results(path).files, report)
-        if (path / ROWS).exists():
-            return _verify_evaluation(path, report)
-    return _verify_files(path, MANIFEST, read_manifest(path).files, report)
+    document, files = _document_and_files(path)
+    for done, (name, entry) in enumerate(files.items(), start=1):
+        check_file(path, name, entry)
+        report("verify", done, len(files))
+    _refuse_unlisted(path, document, unlisted_files(path, [document, *files, CARD]))
+    return len(files)
 
 
 def verify_scores(path: Path, max_bytes: int) -> None:
-    """Compare all files of an evaluation by somebody else with its manifest, before they are used.
-
-    Raises `InputError` as `verify` does and, before anything is read, if the folder holds more than
-    `max_bytes`, or links, pipes or folders.
-    """
-    files = sorted(path.iterdir())
-    for each in (path, *files):
-        if each.is_symlink() or not (each.is_file() or each == path):
-            raise InputError(f"{each}: is a link or no file; a folder of scores holds nothing but files")
-    sizes = {each: each.stat().st_size for each in files}
+    """Verify scores by others; raises `InputError` as `verify`, and for links and more than `max_bytes`."""
+    sizes = {file: file.lstat().st_size for file in sorted(path.iterdir())}
+    for file in (path, *sizes):
+        if file.is_symlink() or not (file.is_file() or file == path):
+            raise InputError(f"{file}: is a link or no file; a folder of scores holds nothing but files")
     if sum(sizes.values()) > max_bytes:
         largest = max(sizes, key=sizes.__getitem__)
-        raise InputError(
-            f"{largest}: has {sizes[largest]} bytes; all files of a folder of scores have {max_bytes} at most"
-        )
-    _verify_evaluation(path, silent)
+        raise InputError(f"{largest}: has {sizes[largest]} bytes; all files may have {max_bytes} together")
+    verify(path)
 
 
 def verify_and_tell(path: Path, *, as_json: bool) -> None:
@@ -99,17 +90,14 @@ def _verify_collection(path: Path, report: Report) -> int:
     return files
 
 
-def _verify_evaluation(path: Path, report: Report) -> int:
-    return _verify_files(path, EVALUATION, read_evaluation(path).files, report, EVALUATION_FOLDER.remedy)
-
-
-def _verify_files(path: Path, document: str, files: Files, report: Report, remedy: str = REMEDY) -> int:
-    """Compare the files of a folder with those that its document lists; returns their number."""
-    for done, (name, entry) in enumerate(files.items(), start=1):
-        check_file(path, name, entry, remedy=remedy)
-        report("verify", done, len(files))
-    _refuse_unlisted(path, document, unlisted_files(path, [document, *files, CARD]))
-    return len(files)
+def _document_and_files(path: Path) -> tuple[str, Mapping[str, Mapping[str, Any]]]:
+    """The document of a folder that is no collection, and the files that it lists."""
+    if not (path / MANIFEST).exists():
+        if (path / RESULTS).exists():
+            return RESULTS, read_results(path).files
+        if (path / ROWS).exists():
+            return EVALUATION, read_evaluation(path).files
+    return MANIFEST, read_manifest(path).files
 
 
 def _refuse_unlisted(path: Path, document: str, unlisted: Iterable[str]) -> None:

@@ -39,7 +39,7 @@ def listing(files: object) -> Callable[[Path], object]:
 
 
 DEEP = "[" * 50_000
-AGAIN = ".*; delete the folder and score it again"
+AGAIN = ".*; delete the folder and make or score it again"
 LINK = ": is a link or no file; a folder of scores holds nothing but files"
 ELSEWHERE = {"../x": {"bytes": 0, "sha256": "0" * 64}}
 # What is done to scores of which a page is made, and what is said of it.
@@ -56,7 +56,7 @@ ATTACKS: dict[str, Attack] = {
     "a folder elsewhere": (lambda f: f.symlink_to(f.rename(f.parent.parent / "away")), f"theirs{LINK}"),
     "2 GB": (
         lambda f: os.truncate(f / ROWS, 1 << 31),
-        f"{ROWS}: has 2147483648 bytes; all .* 20000000 at most",
+        f"{ROWS}: has 2147483648 bytes; all files may have 20000000 together",
     ),
     "no rows": (edit(ROWS, "(?s).*", ""), "theirs: holds no evaluation"),
     "another half": (
@@ -73,9 +73,9 @@ ROW_ATTACKS = {
     "infinity": (IOU, '"iou": 1e999', "planes.0.scores.iou: .* a finite number"),
     "a name of a column": ('"iou"', '"scene"', "planes.0.scores: 'scene' is no name of a measure"),
     "400 digits": ('"seed": 1', f'"seed": {10**400}', "seed: .* a valid number"),
-    "a hole": ('"seed": 1', f'"seed": {DEEP}', "is no JSON object of a row"),
+    "a hole": ('"seed": 1', f'"seed": {DEEP}', "is no row of scores"),
     "no identity": (r'"identity": "\w+", ', "", "identity: Field required"),
-    "no planes": ('"planes"', '"plains"', "planes: Field required"),
+    "no planes": ('"planes"', '"plains"', "is no row of scores"),
 }
 for name, (old, new, words) in ROW_ATTACKS.items():
     ATTACKS[name] = edit(ROWS, old, new), f"{ROWS}: line 1: {words}; delete that line and repeat the command"
@@ -85,7 +85,7 @@ SHAPE = (130, 140)
 DEPTH = "pair_photons_1/1000/depth.npz"
 NUMBERS = r"expected numbers z_mm \(130, 140\), confidence \(130, 140\), of which z_mm is needed"
 DAMAGED = "depth.npz: damaged, or no .npz file as numpy.savez writes it"
-NO_FILE = ": expected a file in this folder; it is missing, a link, or no file"
+NO_FILE = ": expected a file of this folder, no link, of at most"
 
 
 def depth(values: object, **others: Any) -> Callable[[Path], object]:
@@ -138,7 +138,7 @@ FAULTS: dict[str, Attack] = {
     ),
     "another size": (depth(np.ones((130, 14))), NUMBERS),
     **{f"{z!r}": (depth(z), f"depth.npz: {NUMBERS}") for z in (1j, "far", np.datetime64("2026-01-10"), None)},
-    **{f"{z} mm": (depth(z), "z_mm: depths are from 0.001 to 1e.12 mm") for z in (-1.0, 1e-310, 1e200)},
+    **{f"{z} mm": (depth(z), "z_mm: expected 0.001 to 1e.12 mm") for z in (-1.0, 1e-310, 1e200)},
     "8 TiB": (packed((1 << 20, 1 << 20), 0), NUMBERS),
     "a map more": (depth(1.0, error=1.0), f"depth.npz: 'error' is not used; {NUMBERS}"),
     "half a file": (lambda f: os.truncate(f / DEPTH, 9999), DAMAGED),
@@ -155,5 +155,5 @@ FAULTS: dict[str, Attack] = {
         lambda f: (f / DEPTH).symlink_to((f / DEPTH).rename(f.parent / "x")),
         f"depth.npz{NO_FILE}",
     ),
-    "1 TiB": (lambda f: os.truncate(f / DEPTH, 1 << 40), "depth.npz: larger than the 647936 bytes"),
+    "1 TiB": (lambda f: os.truncate(f / DEPTH, 1 << 40), f"depth.npz{NO_FILE} 647936 bytes"),
 }
