@@ -1,5 +1,6 @@
 """One page of all submissions in a folder: lines over light, tables, ranks, and commands."""
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene, read_scores
+from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.pages import accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
-from pcii.evaluation.submissions import SUBMISSION
+from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks, with_yardsticks
 from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
 from pcii.store.collection import IN_FRAMES
+from pcii.store.verification import verify_scores
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+MAX_BYTES = 20_000_000
+"""Size of all files of a submission at most."""
 MIN_PX = 1e-3
 """Smaller errors of depth count as this one where they are averaged as logarithms."""
 
@@ -80,10 +84,13 @@ GEOMETRIC: Mapping[str, Kind] = {"median_px": "geometric"}
 def write_page(folder: Path, out: Path) -> int:
     """Write the page of all submissions in a folder, each a folder of its own; returns how many there are.
 
-    Raises `InputError` for a folder without submissions, one that is not scored, two of one method, and
-    submissions of several benchmarks.
+    Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
+    one method, and submissions of several benchmarks.
     """
-    submissions = {file.parent: read_scores(file.parent) for file in sorted(folder.glob(f"*/{SUBMISSION}"))}
+    submissions: dict[Path, dict[str, Any]] = {}
+    for file in sorted(folder.glob(f"*/{SUBMISSION}")):
+        verify_scores(file.parent, MAX_BYTES)
+        submissions[file.parent] = read_as(ScoredSubmission, file.parent).model_dump(exclude_none=True)
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
     for name in ("benchmark", "half"):
@@ -189,14 +196,15 @@ def _submission_table(
     for method, folder in sorted(folder_of.items()):
         about = submissions[folder]
         is_run = about["made"].startswith("run")
-        work = f"run {about.get('command_name', method)}" if is_run else "score MAPS"
+        work = ["run", about.get("command_name", method)] if is_run else ["score", "MAPS"]
+        options = ["--data", "BENCHMARK", "--half", about["half"], "-o", f"submissions/{folder.name}"]
         rows.append(
             (
                 method,
                 str(about.get("authors", "–")),
                 str(about.get("url", "–")),
                 str(len(frame[frame["method"] == method].drop_duplicates(["identity", "light"]))),
-                f"pcii benchmark {work} --data BENCHMARK --half {about['half']} -o submissions/{folder.name}",
+                shlex.join(["pcii", "benchmark", *work, *options]),
             )
         )
     return Table("Submissions", ("method", "authors", "url", "scores", "command"), tuple(rows), words=3)

@@ -4,7 +4,6 @@ Both are an evaluation with a submission.json beside it, which says whose they a
 Photons, frames and full light of a scene are datasets of their own, and one scene in the frame.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -168,12 +167,3 @@ def _score(
 def by_scene(rows: Sequence[Row]) -> list[Row]:
     """Rows whose datasets belong to one scene of the frame if their titles are the same, in any light."""
     return [row | {"recipe": row["title"]} for row in rows]
-
-
-def read_scores(folder: Path) -> dict[str, Any]:
-    """What submission.json says in a folder of scores; `InputError` if it is damaged."""
-    try:
-        about = json.loads((folder / SUBMISSION).read_text(encoding="utf-8"))
-        return {**about, **{name: str(about[name]) for name in ("benchmark", "half", "method", "made")}}
-    except (ValueError, TypeError, KeyError, OSError):
-        raise InputError(f"{folder / SUBMISSION}: damaged; score the submission again") from None

@@ -78,14 +78,7 @@ def evaluate(
     alone, after a warm-up call at the first dataset of each light; where several processes work at a time,
     each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
     radiance, for an unknown method or budget, for a named method that cannot take the data of a dataset, and
-    while another process evaluates into the same folder:
-
-    >>> evaluate(["out/no-such-dataset"], "out/compared")
-    Traceback (most recent call last):
-    pcii.base.errors.InputError: out/no-such-dataset: there is no such dataset folder
-
-    With datasets of `simgen generate paper -o out/paper20 --seeds 20`, the IoU of each of them is
-    `evaluate(["out/paper20"], "out/compared").frame.groupby(["dataset", "light", "method"]).iou.mean()`.
+    while another process evaluates into the same folder.
     """
     folder = Path(out)
     named = named_methods(methods)

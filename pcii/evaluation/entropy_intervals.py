@@ -57,17 +57,13 @@ def entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth) 
     pseudo_values = GROUPS * entropies(sections.counts) - (GROUPS - 1) * np.stack(others)
     return [
         {
-            f"{z:g}": _half_width(pseudo_values[:, number, plane])
+            f"{z:g}": (interval := mean_interval(pseudo_values[:, number, plane].tolist())).high
+            - interval.mean
             for plane, z in enumerate(sections.z_mm)
             if region.any()
         }
         for number, region in enumerate(regions)
     ]
-
-
-def _half_width(values: np.ndarray) -> float:
-    interval = mean_interval(values.tolist())
-    return interval.high - interval.mean
 
 
 def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:

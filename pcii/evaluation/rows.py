@@ -15,8 +15,9 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Annotated, Any, Literal, NotRequired
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
@@ -25,6 +26,7 @@ from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from pydantic import TypeAdapter
 
     from pcii.store.manifests import DatasetManifest
 
@@ -33,6 +35,8 @@ Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
+MAX_COLUMNS = 300
+"""Some three times what the measures need; a page takes 10 ms for each."""
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -76,6 +80,61 @@ def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
             yield f"{prefix}{name}", value
 
 
+def _measures(scores: Any) -> Any:
+    """Scores by their dotted names; raises ValueError for a name of another column of the frame."""
+    measures = dict(_leaves(scores)) if isinstance(scores, dict) else {}
+    if names := NO_MEASURES & measures.keys():
+        raise ValueError(f"{min(names)!r} is no name of a measure")
+    return measures or scores
+
+
+def _plane_parts(plane: Any) -> Any:
+    """A plane with its scores apart."""
+    scores = dict(plane)
+    parts = {name: scores.pop(name) for name in ("z_mm", "object", "truth") if name in scores}
+    return parts | {"scores": scores}
+
+
+@cache
+def _row_model() -> "TypeAdapter[Any]":
+    """The model of a row, made when the first is read: pydantic is slow to load."""
+    from pydantic import BeforeValidator, Field, TypeAdapter
+    from typing_extensions import TypedDict
+
+    from pcii.store.manifests import OPEN, Text
+
+    is_not_negative, by_names = Field(ge=0), BeforeValidator(_measures)
+
+    class Plane(TypedDict):
+        __pydantic_config__ = OPEN  # type: ignore[misc]
+        z_mm: float
+        object: Text | None
+        truth: Literal["object", "pixel"]
+        scores: Annotated[dict[str, float | None], by_names]
+
+    class RowModel(TypedDict):
+        __pydantic_config__ = OPEN  # type: ignore[misc]
+        dataset: Text
+        identity: Text
+        recipe: Text
+        title: Text
+        method: Text
+        budget: Annotated[float, is_not_negative] | Literal["full-light"] | None
+        seed: NotRequired[float | None]
+        settings: NotRequired[dict[str, Any]]
+        z_mm: NotRequired[list[float]]
+        photons_per_view: NotRequired[Annotated[float, is_not_negative] | None]
+        seconds: NotRequired[Annotated[float, is_not_negative] | None]
+        software: NotRequired[dict[str, Text] | None]
+        date: NotRequired[Text]
+        machine: NotRequired[Text]
+        bound_px: NotRequired[float | None]
+        depth: NotRequired[Annotated[dict[str, float | None], by_names]]
+        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
+
+    return TypeAdapter(RowModel)
+
+
 def key_of(row: Mapping[str, Any]) -> Key:
     """Identity of the dataset, light and method of a row, and depths that replace the dataset's."""
     return row["identity"], row["budget"], row["method"], tuple(row.get("z_mm", ()))
@@ -109,27 +168,37 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
     out.mkdir(parents=True, exist_ok=True)
     with locked(out / ROWS, out) as file:
         content = file.read()
+        rows = _parsed(out, content)
         file.truncate(content.rfind(b"\n") + 1)
-        yield RowFile(file, _parsed(out, content))
+        yield RowFile(file, rows)
 
 
 def read_rows(out: Path) -> list[Row]:
     """The last row of each key in a folder; `InputError` if there are none, and for a line that is no row."""
-    try:
-        return list(_parsed(out, (out / ROWS).read_bytes()).values())
-    except FileNotFoundError:
-        raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one") from None
+    rows = _parsed(out, (out / ROWS).read_bytes()) if (out / ROWS).is_file() else {}
+    if not rows:
+        raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one")
+    return list(rows.values())
 
 
 def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
+    from pydantic import ValidationError
+
+    from pcii.store.manifests import first_fault
+
     *lines, _ = content.split(b"\n")  # the last one is empty, or unfinished
     rows: dict[Key, Row] = {}
     for number, line in enumerate(lines, start=1):
         try:
             row = json.loads(line)
+            _row_model().validate_python(row)
+            if not (row.get("depth") or row.get("planes")):
+                raise ValueError("no scores")
             rows[key_of(row)] = row
-        except (ValueError, KeyError, TypeError):
-            raise InputError(f"{out / ROWS}: line {number} is damaged; delete that line") from None
+        except (ValueError, TypeError, RecursionError) as fault:
+            words = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
+            advice = "delete that line and repeat the command that made it"
+            raise InputError(f"{out / ROWS}: line {number}: {words}; {advice}") from None
     return rows
 
 
@@ -155,6 +224,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
         for row in rows
         for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
     ]
+    if len(set().union(*records)) > MAX_COLUMNS:
+        raise InputError(
+            f"{ROWS}: expected the same measures in all rows, not more than {MAX_COLUMNS} different ones"
+        )
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
     frame[texts] = frame[texts].map(_encodable, na_action="ignore")

@@ -8,24 +8,33 @@
 The first folder is that of the dataset; the second says from how many photons per view, or "full-light".
 """
 
+import math
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
-from zipfile import BadZipFile
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
+from numpy.lib import format as npy_format
 from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError
 
 from pcii.base.errors import InputError
 from pcii.evaluation.method_names import NamedMethod, depth_name, estimator_of, named_method
 from pcii.evaluation.tasks import Task
+from pcii.store.collection import Half
 from pcii.store.dataset import Dataset
+from pcii.store.manifests import first_fault
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap
 from pcii.types.photon_limit import FULL_LIGHT
 
 SUBMISSION = "submission.json"
 DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
+MIN_MM, MAX_MM = 1e-3, 1e12
+"""Nearest and farthest depth of an answer: errors of others overflow."""
+MAX_OVERHEAD_BYTES = 1 << 16
+"""Size of a submission.json at most, and of what an .npz file has beside its numbers."""
 Text = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -42,22 +51,39 @@ class Submission(BaseModel):
     trained_on: Text | None = None
 
 
+class ScoredSubmission(Submission):
+    """What the submission.json of a folder of scores says."""
+
+    half: Half
+    made: Text
+    command_name: Text | None = None
+
+
 def read_submission(folder: Path, benchmark: str) -> Submission:
     """What submission.json says; `InputError` if it is missing, wrong, or of another benchmark."""
-    file = folder / SUBMISSION
-    try:
-        submission = Submission.model_validate_json(file.read_bytes())
-    except OSError:
-        raise InputError(f"{file}: is missing") from None
-    except ValidationError as fault:
-        first = fault.errors()[0]
-        field = ".".join(map(str, first["loc"]))
-        names = ", ".join(Submission.model_fields)
-        raise InputError(f"{file}: {field!r}: {first['msg']}; expected a JSON object of {names}") from None
+    submission, file = read_as(Submission, folder), folder / SUBMISSION
     if submission.benchmark != benchmark:
         raise InputError(f"{file}: benchmark: is {submission.benchmark!r}, but the data are of {benchmark!r}")
     named_method((submission.method, _read_as_maps))  # raises `InputError` for a name that is taken
     return submission
+
+
+def read_as(model: type[Submission], folder: Path) -> Submission:
+    """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
+    file = folder / SUBMISSION
+    _check_file(folder, file, MAX_OVERHEAD_BYTES)
+    try:
+        return model.model_validate_json(file.read_bytes())
+    except ValidationError as fault:
+        expected = f"expected a JSON object of {', '.join(model.model_fields)}"
+        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None
+
+
+def _check_file(folder: Path, file: Path, max_bytes: int) -> None:
+    """Raise `InputError` for what is no file of this folder, or a larger one."""
+    is_inside = file.is_file() and file.resolve().is_relative_to(folder.resolve())
+    if not is_inside or file.stat().st_size > max_bytes:
+        raise InputError(f"{file}: expected a file of this folder, no link, of at most {max_bytes} bytes")
 
 
 def _read_as_maps(*_: Any) -> Any:
@@ -68,7 +94,7 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
     """The tasks that a submission has results of.
 
     Whatever light it has masks or depth of, it has them of all datasets that have this light: else raises
-    `InputError`, as for files that are no result of a dataset and its light.
+    `InputError`, as for files that are no result of a dataset and its light. Warns of other files.
     """
     possible = {
         folder / dataset.name / str(light) / file: Task(dataset, light, NamedMethod(name, _read_as_maps))
@@ -77,12 +103,17 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
         for file, name in ((MASKS, method), (DEPTH_MAP, depth_name(method)))
         if file == DEPTH_MAP or light != FULL_LIGHT
     }
-    for file in sorted(folder.glob("*/*/[!.]*")):
+    present = {*folder.glob("*/*/[!.]*")}
+    for file in sorted(present):
         if file not in possible:
             raise InputError(
                 f"{file}: is no result of this half; expected files DATASET/LIGHT/{DEPTH_MAP} or {MASKS}"
             )
-    tasks = {file: task for file, task in possible.items() if file.is_file()}
+    tasks = {file: possible[file] for file in possible if file in present}
+    others = [*folder.glob("[!.]*"), *folder.glob("*/[!.]*")]
+    names = [str(file.relative_to(folder)) for file in sorted(others) if not file.is_dir()]
+    if unused := ", ".join(name for name in names if name != SUBMISSION):
+        warnings.warn(f"{folder}: not used: {unused}", stacklevel=2)
     if not tasks:
         raise InputError(f"{folder}: has no results of a dataset of this half")
     kinds = {(task.light, task.method.name) for task in tasks.values()}
@@ -97,38 +128,63 @@ def read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
     inside = folder / task.dataset.name / str(task.light)
     shape = task.dataset.grid.shape_HW
     if estimator_of(task.method.name) is not None:
-        return _read_depth(inside / DEPTH_MAP, shape)
-    file = inside / MASKS
-    masks = _read_arrays(file, {"in_focus": (len(planes_of(task.dataset, ()).z_mm), *shape)})["in_focus"]
+        return _read_depth(folder, inside / DEPTH_MAP, shape)
+    file, shapes = inside / MASKS, {"in_focus": (len(planes_of(task.dataset, ()).z_mm), *shape)}
+    masks = _read_arrays(folder, file, shapes)["in_focus"]
     if not np.isin(masks, (0, 1)).all():
         raise InputError(f"{file}: in_focus: expected 0 and 1, or bool")
     return masks.astype(bool)
 
 
-def _read_depth(file: Path, shape: tuple[int, int]) -> DepthMap:
-    arrays = _read_arrays(file, {"z_mm": shape, "confidence": shape})
+def _read_depth(folder: Path, file: Path, shape: tuple[int, int]) -> DepthMap:
+    arrays = _read_arrays(folder, file, {"z_mm": shape, "confidence": shape})
     has_answer = np.isfinite(arrays["z_mm"])
     z_mm = np.where(has_answer, arrays["z_mm"], np.nan).astype(np.float64)
-    if (z_mm <= 0).any():
-        raise InputError(f"{file}: z_mm: depths are above 0 mm; give NaN where there is no answer")
+    if ((z_mm < MIN_MM) | (z_mm > MAX_MM)).any():
+        raise InputError(f"{file}: z_mm: expected {MIN_MM:g} to {MAX_MM:g} mm, or NaN for no answer")
     confidence = arrays.get("confidence", has_answer)
     if not ((confidence >= 0) & (confidence <= 1)).all():
         raise InputError(f"{file}: confidence: expected numbers from 0 to 1, also where there is no depth")
     return DepthMap(z_mm, np.where(has_answer, confidence, 0.0).astype(np.float64))
 
 
-def _read_arrays(file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:
+def _read_arrays(folder: Path, file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:
     """Arrays of an .npz file with these shapes, the first of which is needed; else raises `InputError`."""
-    try:
-        with np.load(file, allow_pickle=False) as loaded:
-            arrays = dict(loaded)
-    except (BadZipFile, OSError, ValueError, KeyError, EOFError):
-        raise InputError(f"{file}: damaged, or no .npz file of plain numbers") from None
+    numbers = sum(map(math.prod, shapes.values()))
+    _check_file(folder, file, MAX_OVERHEAD_BYTES + 16 * numbers)  # those of long doubles
     needed, *_ = shapes
-    is_right = needed in arrays and all(
-        shapes.get(name) == values.shape and values.dtype.kind in "fiub" for name, values in arrays.items()
-    )
-    if not is_right:
-        expected = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-        raise InputError(f"{file}: expected numbers {expected}, of which {needed} is needed")
-    return arrays
+    described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+    expected = f"expected numbers {described}, of which {needed} is needed"
+    try:
+        with ZipFile(file) as archive:
+            members = {name.removesuffix(".npy"): name for name in archive.namelist()}
+            if unused := members.keys() - shapes:
+                raise InputError(f"{file}: {min(unused)!r} is not used; {expected}")
+            headers = {name: _header(archive, member) for name, member in members.items()}
+            if needed not in headers or any(headers[name] != (shapes[name], True) for name in headers):
+                raise InputError(f"{file}: {expected}")
+            return {name: _read_array(archive, members[name]) for name in members}
+    except InputError:
+        raise
+    except Exception:  # damaged archives and headers raise various exceptions
+        raise InputError(f"{file}: damaged, or no .npz file as numpy.savez writes it") from None
+
+
+def _header(archive: ZipFile, name: str) -> tuple[tuple[int, ...], bool]:
+    """Shape of an array, for which memory is taken when it is read, and whether it is of real numbers."""
+    # Other methods than those of NumPy unpack a few bytes to gigabytes in one step.
+    if archive.getinfo(name).compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+        raise ValueError("compressed by another method")
+    with archive.open(name) as member:
+        if npy_format.read_magic(member) != (1, 0):  # headers of other versions may have gigabytes
+            raise ValueError("a header for more than numbers")
+        shape, _, dtype = npy_format.read_array_header_1_0(member)
+    return shape, dtype.kind in "fiub"
+
+
+def _read_array(archive: ZipFile, name: str) -> np.ndarray:
+    with archive.open(name) as member:
+        array = npy_format.read_array(member, allow_pickle=False)
+        if member.read(1):  # at the end the checksum is compared
+            raise ValueError("more than an array")
+    return array

@@ -31,7 +31,7 @@ ROWS = "rows.jsonl"
 EVALUATION = "evaluation.json"
 LOCK = ".lock"
 """Locked while a run writes to the folder of a collection, and then removed."""
-REMEDY = "delete the folder and make it again"
+REMEDY = "delete the folder and make or score it again"
 """How errors about damaged files end."""
 _NO_CHECKSUM = "0" * 64
 

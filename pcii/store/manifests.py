@@ -166,6 +166,11 @@ def validated(model: type[AnyManifest], document: Mapping[str, Any]) -> AnyManif
     try:
         return model.model_validate(document)
     except ValidationError as fault:
-        first = fault.errors(include_url=False)[0]
-        member = ".".join(str(step) for step in first["loc"] if step != "[key]")
-        raise InputError(visible(f"{member}: {first['msg'].removeprefix('Value error, ')}")) from None
+        raise InputError(first_fault(fault)) from None
+
+
+def first_fault(fault: ValidationError) -> str:
+    """The first member that does not fit a model, and what is wrong with it."""
+    first = fault.errors(include_url=False)[0]
+    member = ".".join(str(step) for step in first["loc"] if step != "[key]")
+    return visible(": ".join(filter(None, (member, first["msg"].removeprefix("Value error, ")))))

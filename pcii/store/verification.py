@@ -46,6 +46,18 @@ def verify(path: Path, report: Report = silent) -> int:
     return len(files)
 
 
+def verify_scores(path: Path, max_bytes: int) -> None:
+    """Verify scores by others; raises `InputError` as `verify`, and for links and more than `max_bytes`."""
+    sizes = {file: file.lstat().st_size for file in sorted(path.iterdir())}
+    for file in (path, *sizes):
+        if file.is_symlink() or not (file.is_file() or file == path):
+            raise InputError(f"{file}: is a link or no file; a folder of scores holds nothing but files")
+    if sum(sizes.values()) > max_bytes:
+        largest = max(sizes, key=sizes.__getitem__)
+        raise InputError(f"{largest}: has {sizes[largest]} bytes; all files may have {max_bytes} together")
+    verify(path)
+
+
 def verify_and_tell(path: Path, *, as_json: bool) -> None:
     """Verify for a command: print the number of files or, as JSON, that and the fault, also raised.
 

@@ -266,13 +266,6 @@ def test_a_run_that_fails_keeps_what_it_measured_and_a_second_one_is_refused(
         verify(out)
 
 
-def test_a_damaged_line_is_named(evaluated: Evaluation, tmp_path: Path) -> None:
-    lines = (evaluated.folder / ROWS).read_bytes().splitlines(keepends=True)
-    (tmp_path / ROWS).write_bytes(b"".join([*lines[:2], lines[2][5:], *lines[3:]]))
-    with pytest.raises(InputError, match=r"rows.jsonl: line 3 is damaged; delete that line"):
-        read_rows(tmp_path)
-
-
 def test_what_cannot_be_evaluated_is_refused_before_any_work(
     series: Path, tmp_path: Path, calls: list[str]
 ) -> None:

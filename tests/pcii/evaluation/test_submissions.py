@@ -1,14 +1,14 @@
-"""Methods run on a small benchmark, maps made elsewhere, and submissions with faults."""
+"""Methods run on a small benchmark, maps made elsewhere, and folders with faults."""
 
 import json
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from hostile_submissions import ATTACKS, DEPTH, FAULTS, SHAPE, depth, edit
 
 import pcii
 from pcii.app.commands import app
@@ -17,7 +17,7 @@ from pcii.base.errors import InputError
 from pcii.evaluation.benchmark_page import COMPARISONS, write_page
 from pcii.evaluation.benchmark_scores import BenchmarkHalf, open_benchmark, run_method, score_submission
 from pcii.evaluation.comparison import Evaluation
-from pcii.evaluation.submissions import SUBMISSION
+from pcii.evaluation.submissions import SUBMISSION, read_maps, tasks_of_submission
 from pcii.store.verification import verify
 
 pytestmark = pytest.mark.renders
@@ -115,6 +115,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     folder, out = tmp_path / "submissions", tmp_path / "page.html"
     shutil.copytree(scored.folder, folder / "theirs")
     run_method("depth:posterior", data, folder / "ours")
+    edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "a; b')(folder / "ours")
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()
     assert "small: methods compared" in text
@@ -122,6 +123,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     for method in ("mine", "depth:mine", "depth:posterior", *bounds):
         assert f">{method}</td>" in text
     assert "pcii benchmark score MAPS --data BENCHMARK --half development -o submissions/theirs" in text
+    assert "pcii benchmark run &#39;a; b&#39; --data" in text  # as one word of a shell
     shutil.copytree(folder / "ours", folder / "again")
     with pytest.raises(InputError, match="again and ours are both of 'depth:posterior'"):
         write_page(folder, out)
@@ -130,30 +132,17 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     assert out.read_text() == text
 
 
-# What is done to a good submission, and what is said of it.
-SHAPE = (130, 140)
-FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
-    "another benchmark": (
-        lambda f: (f / SUBMISSION).write_text('{"benchmark": "large", "method": "mine"}'),
-        "benchmark: is 'large', but the data are of 'small'",
-    ),
-    "a dataset that is not there": (
-        lambda f: shutil.copytree(f / "pair_photons_1", f / "pear_photons_1"),
-        "pear_photons_1/.*: is no result of this half; expected files DATASET/LIGHT/depth.npz or masks.npz",
-    ),
-    "missing pieces": (
-        lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
-        r"pair_photons_2/1000/\w+.npz: is missing, and of this light it is needed of all datasets$",
-    ),
-    "a map of another size": (
-        lambda f: np.savez(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.ones((130, 14))),
-        r"depth.npz: expected numbers z_mm \(130, 140\), confidence \(130, 140\), of which z_mm is needed",
-    ),
-    "masks of shares": (
-        lambda f: np.savez(f / "pair_photons_1" / "1000" / "masks.npz", in_focus=np.full((2, *SHAPE), 0.5)),
-        "in_focus: expected 0 and 1",
-    ),
-}
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_no_page_is_made_of_scores_that_were_changed(
+    attack: str, scored: Evaluation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make, says = ATTACKS[attack]
+    folder, out = tmp_path / "submissions" / "theirs", tmp_path / "page.html"
+    shutil.copytree(scored.folder, folder)
+    make(folder)
+    assert command_line.run(app, ["benchmark", "page", str(folder.parent), "-o", str(out)]) == 2
+    assert re.fullmatch(f"error: .*{says}.*\n", capsys.readouterr().err)
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -169,7 +158,21 @@ def test_submissions_with_faults_are_answered_in_a_sentence(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_submission_without_results_is_refused(tmp_path: Path, data: BenchmarkHalf) -> None:
-    (tmp_path / SUBMISSION).write_text('{"benchmark": "small", "method": "mine"}')
-    with pytest.raises(InputError, match="has no results of a dataset of this half"):
-        score_submission(tmp_path, data, tmp_path / "out")
+@pytest.mark.parametrize("dtype", ["<f8", ">f4", "<f2", ">u2", "?"])
+def test_maps_have_any_type_and_order_of_numbers(
+    dtype: str, data: BenchmarkHalf, submitted: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "mine"
+    shutil.copytree(submitted, folder)
+    (folder / "notes.txt").touch()
+    values = np.asfortranarray(np.indices(SHAPE).sum(axis=0) % 2, dtype=dtype)
+    depth(values + np.ones((), dtype))(folder)
+    np.savez_compressed(folder / DEPTH.replace("depth", "masks"), in_focus=np.stack([values, values]))
+    with pytest.warns(UserWarning, match="mine: not used: notes.txt$"):
+        tasks = tasks_of_submission(folder, data.datasets, "mine")
+    for task in tasks:
+        if f"{task.dataset.name}/{task.light}/depth.npz" == DEPTH:
+            result = read_maps(folder, task)
+            is_depth = isinstance(result, pcii.DepthMap)
+            expected = values + np.ones((), dtype) if is_depth else np.stack([values, values])
+            np.testing.assert_array_equal(result.z_mm if is_depth else result, expected)
