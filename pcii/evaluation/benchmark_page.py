@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
-from pcii.evaluation.pages import accuracy_plot, page
+from pcii.evaluation.pages import ABOUT_YARDSTICKS, accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks, with_yardsticks
@@ -114,6 +114,7 @@ def write_page(folder: Path, out: Path) -> int:
     content = {
         "benchmark": about["benchmark"],
         "half": about["half"],
+        "yardsticks": ABOUT_YARDSTICKS,
         "scenes": of_scenes["scene"].nunique(),
         "kinds": [
             _compare(comparison, of_cells)

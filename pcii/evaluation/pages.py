@@ -31,6 +31,11 @@ AXES = {
     "median_px": "median error of depth, px of total disparity",
 }
 """Measures of accuracy that are drawn, with the labels of their axes."""
+ABOUT_YARDSTICKS = (
+    "Rows in parentheses look at no photon: who claims and answers nothing, who claims everything at every "
+    "plane, and who answers the one depth that is right for most pixels, which only the truth tells. Sweeps "
+    f"are the simplest methods of depth. {NOT_BETTER}: no better than the best of these there."
+)
 NOTES = (
     "IoU compares masks with the objects that belong to each plane, and is a mean over planes that hold any. "
     "What leans through the depths belongs to no plane: it counts in the IoU of pixels, and in depth. In "
@@ -42,9 +47,7 @@ NOTES = (
     "comparisons. Of n pairs it cannot be less than 2 / 2^n, so fewer than six never give 0.05.",
     "Over several scenes every scene counts once, as the mean over its seeds. Ranks are of the scenes and "
     "seeds that all methods have; their intervals and p are of the spread between scenes.",
-    "Rows in parentheses look at no photon: who claims and answers nothing, who claims everything at every "
-    "plane, and who answers the one depth that is right for most pixels, which only the truth tells. Sweeps "
-    f"are the simplest methods of depth. {NOT_BETTER}: no better than the best of these there.",
+    ABOUT_YARDSTICKS,
     "Depth: shares are of the objects' pixels, within 1 or 3 px of total disparity, and a missing answer is "
     "a wrong one, in the median too. Quadratic score: share within 1 px minus the Brier score of confidence; "
     "0 is who never answers, 1 who is always right and sure. Bound: the least standard deviation of the "
