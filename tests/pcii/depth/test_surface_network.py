@@ -89,15 +89,16 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
     samples, hint = grid.view_count * METHOD.block_px**2, hint_of(planes.total_disparity_px, np.array([4.0]))
-    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1, hint=hint)
+    film = slice(0, 2 * -(-evidence.nats.shape[1] // 2)), slice(0, 2 * -(-evidence.nats.shape[2] // 2))
+    own = inputs_of(evidence, samples, SurfacePrior(), film, hint)
     turned = inputs_of(
         evidence._replace(
             nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
         ),
         samples,
         SurfacePrior(),
-        multiple=1,
-        hint=hint,
+        film,
+        hint,
     )
     for part, other in zip(own[:4], turned[:4], strict=True):
         np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
