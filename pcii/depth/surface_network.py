@@ -25,7 +25,7 @@ network was not trained on (docs/experiments/depth.md; temperature scaling, Guo 
 BAND_VALUES = 1 << 20
 """Blocks times planes whose last step is done at once by a thread, which takes 0.2 GB."""
 
-NEAR_PX = 10.0
+FOCUS_PX = 10.0
 """What is farther from a requested plane in total disparity has a blur half-extent above 5 px, and is
 defocused as far as its depth says."""
 MIN_NEAR = 1e-3
@@ -103,13 +103,13 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
 def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
     """Which of Z planes, 1 px of total disparity apart, are near each requested one: (R, Z) float32, 0 or 1.
 
-    A plane is near the closest requested one, if within `NEAR_PX`; NaN requests nothing.
+    A plane is near the closest requested one, if within `FOCUS_PX`; NaN requests nothing.
     """
     if requested_planes.size == 0:
         return np.zeros((0, Z), np.float32)
     distance = np.abs(np.arange(Z) - np.nan_to_num(requested_planes, nan=np.inf)[:, None])
     is_closest = distance.argmin(axis=0) == np.arange(requested_planes.size)[:, None]
-    return (is_closest & (distance <= NEAR_PX)).astype(np.float32)
+    return (is_closest & (distance <= FOCUS_PX)).astype(np.float32)
 
 
 @cache

@@ -104,6 +104,17 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
         np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
 
 
+def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
+    """To the last bit, the mirrored end of the film included."""
+    planes = FocalPlanes.at_total_disparity(two_squares.counts.grid, np.arange(2.0, 5.0))
+    evidence = evidence_of_texture(two_squares.counts, planes)
+    film = METHOD.network_inputs(evidence, planes, 2, np.zeros(0))
+    h, w = film.evidence.shape[1:]
+    part = METHOD.network_inputs(evidence, planes, 2, np.zeros(0), (slice(h - 96, h), slice(32, w)))
+    for whole, own, side in zip(film[:4], part[:4], (1, 1, 2, 2), strict=True):
+        assert np.array_equal(whole[:, (h - 96) // side :, 32 // side :], own)
+
+
 def test_a_hint_says_how_near_a_plane_is_to_the_nearest_requested_one() -> None:
     total_px = np.arange(2.0, 8.0)
     hint = hint_of(total_px, np.array([3.0, 30.0]))
