@@ -139,11 +139,9 @@ class PosteriorDepth:
         if not enough.any():
             return None
         margin = self.margin_blocks // CELL_BLOCKS
+        step = MULTIPLE // CELL_BLOCKS
         rows, cols = (
-            slice(
-                axis.start * CELL_BLOCKS // MULTIPLE * MULTIPLE,
-                -(-axis.stop * CELL_BLOCKS // MULTIPLE) * MULTIPLE,
-            )
+            slice(axis.start // step * MULTIPLE, -(-axis.stop // step) * MULTIPLE)
             for axis in box_around(enough, (margin, margin))
         )
         return rows, cols

@@ -16,37 +16,32 @@ def gaussian_mean(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """
     h, w = values.shape
     reach = weight.size - 1
-    result, dark = np.empty((h, w), np.float32), np.zeros(w, np.float32)
+    result, dark = np.zeros((h, w), np.float32), np.zeros(w, np.float32)
     line = np.zeros(w + 2 * reach, np.float32)
     for i in range(h):
-        # Slices, so that the compiler sees that neighbours exist and takes several at a time.
-        _add_pair(line[reach : reach + w], values[i], dark, weight[0], True)
-        for r in range(1, reach + 1):
+        own = line[reach : reach + w]
+        own[:] = 0
+        for r in range(reach + 1):
             above = values[i - r] if i >= r else dark
-            below = values[i + r] if i + r < h else dark
-            _add_pair(line[reach : reach + w], above, below, weight[r], False)
-        _add_pair(result[i], line[reach : reach + w], dark, weight[0], True)
-        for r in range(1, reach + 1):
-            left, right = line[reach - r : reach - r + w], line[reach + r : reach + r + w]
-            _add_pair(result[i], left, right, weight[r], False)
+            below = values[i + r] if 0 < r < h - i else dark
+            _add_pair(own, above, below, weight[r])
+        for r in range(reach + 1):
+            right = line[reach + r : reach + r + w] if r > 0 else dark
+            _add_pair(result[i], line[reach - r : reach - r + w], right, weight[r])
     return result
 
 
 @helper
-def _add_pair(total: np.ndarray, one: np.ndarray, other: np.ndarray, weight: float, is_first: bool) -> None:
-    """Add `weight` times a pair of rows to a row, or set it."""
-    if is_first:
-        for j in range(total.size):
-            total[j] = weight * (one[j] + other[j])
-    else:
-        for j in range(total.size):
-            total[j] += weight * (one[j] + other[j])
+def _add_pair(total: np.ndarray, one: np.ndarray, other: np.ndarray, weight: float) -> None:
+    # Of slices, so that the compiler sees that neighbours exist and takes several at a time.
+    for j in range(total.size):
+        total[j] += weight * (one[j] + other[j])
 
 
 @compiled
 def octave_evidence(
-    finer: tuple[np.ndarray, np.ndarray, np.ndarray],
-    coarser: tuple[np.ndarray, np.ndarray, np.ndarray],
+    finer: tuple[np.ndarray, ...],
+    coarser: tuple[np.ndarray, ...],
     spread: np.ndarray,
     constants: np.ndarray,
 ) -> np.ndarray:

@@ -92,11 +92,9 @@ def evidence_of_texture(
 
     planes = replace(planes, rounding=ROUNDING)
     chosen = model or TextureModel()
-    colours = 1
+    colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
     if isinstance(data, PhotonCounts):
         data = replace(data, cfa=None)  # colours are summed, sooner is faster
-    else:
-        colours = data.radiance.shape[-1]
     least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
     scale = binary_scale(data) if isinstance(data, Views) else 1.0
     h, w = (-(-size // block_px) for size in data.grid.shape_HW)
@@ -160,10 +158,7 @@ def _samples_of_blocks(plane: FocalPlanes, axis: int, block_px: int) -> np.ndarr
 
 
 def _of_section(
-    blocks: list[np.ndarray],
-    number: tuple[np.ndarray, np.ndarray],
-    model: TextureModel,
-    least_samples: float,
+    blocks: list[np.ndarray], number: tuple[np.ndarray, ...], model: TextureModel, least_samples: float
 ) -> list[np.ndarray]:
     """The e of each octave on its own grid, from the values of `_block_sums` and `_samples_of_blocks`."""
     from scipy.ndimage import gaussian_filter1d
@@ -174,11 +169,10 @@ def _of_section(
     for octave in range(model.octaves):
         if octave > 1:
             blocks = [block_sums(part, 2, np.float32) / 4 for part in blocks]
-            number = _halved(number[0]), _halved(number[1])
+            number = tuple(map(_halved, number))
         finer = blocks[0], *number
         blocks = [gaussian_mean(part, _weights(octave)) for part in blocks]
-        by_row, by_col = (gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
-        number = by_row, by_col
+        number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
         of_model = _noise_weight(octave), model.averaging_error, model.contrast
         constants = np.array([*of_model, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
         excess.append(octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))

@@ -49,7 +49,7 @@ def test_two_octaves_are_those_of_the_equations() -> None:
     colours_apart = section.counts, section.coverage
     fine = [block_sums(part.sum(axis=-1, dtype=float), 2, float) for part in colours_apart]
     fine = [np.pad(part, [(0, 0), *((0, -size % 4) for size in part.shape[1:])]) for part in fine]
-    impulse, expected = np.zeros((99, 99)), 0
+    impulse, expected = np.zeros((99, 99)), np.zeros(1)
     impulse[49, 49] = 1
     for octave, sigma in enumerate((1.0, 3**0.5)):
         coarse = [gaussian_filter(part, sigma, mode="constant", axes=(1, 2)) for part in fine]
