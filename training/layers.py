@@ -34,9 +34,12 @@ def by_film(x: Tensor, films: int) -> Tensor:
     return x.reshape(films, -1, *x.shape[1:])
 
 
-def over_all(x: Tensor) -> Tensor:
-    """The largest and the mean feature (B, 2 C, h, w) over the planes of features (B, Z, C, h, w)."""
-    return torch.cat([x.amax(1), x.mean(1)], dim=1)
+def over_all(x: Tensor, films: int) -> Tensor:
+    """The largest and the mean feature (B, 2 C, h, w) over planes of features (B Z, C, h, w)."""
+    if films == 1:  # ONNX Runtime takes the first axis fastest, and in threads
+        return torch.cat([x.amax(0, keepdim=True), x.mean(0, keepdim=True)], dim=1)
+    planes = by_film(x, films)
+    return torch.cat([planes.amax(1), planes.mean(1)], dim=1)
 
 
 class Block(nn.Module):
@@ -55,7 +58,7 @@ class Block(nn.Module):
         n, planes = self.share, by_film(x, films)
         parts = [moved(planes[:, :, i * n : (i + 1) * n], step) for i, step in enumerate(STEPS)]
         exchanged = torch.cat([*parts, planes[:, :, len(STEPS) * n :]], dim=2).flatten(0, 1)
-        first = by_film(self.first(exchanged), films) + self.over_planes(over_all(planes))[:, None]
+        first = by_film(self.first(exchanged), films) + self.over_planes(over_all(x, films))[:, None]
         return x + self.second(f.relu(first).flatten(0, 1))
 
 
@@ -121,7 +124,7 @@ class Trunk(nn.Module):
         x = f.relu(fine + f.interpolate(self.up[0](x), scale_factor=2.0, mode="nearest"))
         x = x + f.relu(self.last(x))
         logit = self.logit(x) + self.trust * surface.flatten(0, 1)[:, None]
-        return x, logit, self.mask(x), self.nothing(over_all(by_film(x, films)))
+        return x, logit, self.mask(x), self.nothing(over_all(x, films))
 
 
 class Head(nn.Module):

@@ -75,19 +75,20 @@ class PosteriorDepth:
             block_px *= 2
         evidence = evidence_of_texture(data, planes, block_px, self.model)
         requested_px = total_disparity_px(data.grid, z_mm)
-        inputs = self.network_inputs(evidence, planes, block_px, requested_px)
         # Where there are no photons there is no surface, and the depth map has no answer.
-        probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
+        probability, nothing = np.zeros_like(evidence.nats), np.ones_like(evidence.nats[0])
         in_focus = np.zeros((z_mm.size, *nothing.shape), np.float32)
-        part = self._part_with_photons(evidence.photons, block_px, nothing.shape)
+        part = self._part_with_photons(evidence.photons, block_px)
         if part is not None:
             requested_planes = np.interp(requested_px, planes.total_disparity_px, np.arange(len(planes)))
-            outputs = run_network(inputs.part(*part), requested_planes)
-            probability[:, *part], nothing[part], in_focus[:, *part] = outputs
-        h, w = evidence.nats.shape[1:]
-        whole = np.s_[..., :h, :w]
-        maps = probability[whole], nothing[whole], block_px, in_focus[whole]
-        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros((h, w), bool))
+            inputs = self.network_inputs(evidence, planes, block_px, requested_px, part)
+            for film, own in zip(
+                (probability, nothing, in_focus), run_network(inputs, requested_planes), strict=True
+            ):
+                target = film[..., *part]
+                target[...] = own[..., : target.shape[-2], : target.shape[-1]]
+        maps = probability, nothing, block_px, in_focus
+        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing.shape, bool))
         return replace(posterior, is_detected=self._detected(data, posterior, evidence.photons))
 
     def _detected(
@@ -111,32 +112,39 @@ class PosteriorDepth:
         return agree | is_possible & (agreed_share >= self.min_agreed_share)
 
     def network_inputs(
-        self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int, requested_px: np.ndarray
+        self,
+        evidence: TextureEvidence,
+        planes: FocalPlanes,
+        block_px: int,
+        requested_px: np.ndarray,
+        part: tuple[slice, slice] | None = None,
     ) -> NetworkInputs:
-        """What the network is given for the evidence of blocks of photon counts.
+        """What the network is given for a part of the film, or for all of it.
 
-        `requested_px` (R,) are the total disparities of planes that are asked about.
+        `requested_px` (R,) are the total disparities of planes that are asked about; `part` is rows and
+        columns of blocks.
         """
+        rows, cols = (slice(0, -(-size // MULTIPLE) * MULTIPLE) for size in evidence.nats.shape[1:])
         hint = hint_of(planes.total_disparity_px, requested_px)
-        return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
+        samples_per_block = planes.grid.view_count * block_px**2
+        return inputs_of(evidence, samples_per_block, self.prior, part or (rows, cols), hint)
 
-    def _part_with_photons(
-        self, photons: np.ndarray, block_px: int, shape: tuple[int, ...]
-    ) -> tuple[slice, slice] | None:
+    def _part_with_photons(self, photons: np.ndarray, block_px: int) -> tuple[slice, slice] | None:
         """The smallest box of rows and columns, in blocks, that the network has to be run on; None if empty.
 
         It holds all blocks with enough photons around them at any plane, with a margin, and is a whole number
-        of cells of the network's coarsest level, on a film of `shape` blocks.
+        of cells of the network's coarsest level, the last of which may reach beyond the film.
         """
         enough = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
         if not enough.any():
             return None
         margin = self.margin_blocks // CELL_BLOCKS
-        part = []
-        for axis, size in zip(box_around(enough, (margin, margin)), shape, strict=True):
-            first, last = axis.start * CELL_BLOCKS // MULTIPLE, -(-axis.stop * CELL_BLOCKS // MULTIPLE)
-            part.append(slice(first * MULTIPLE, min(last * MULTIPLE, size)))
-        return part[0], part[1]
+        step = MULTIPLE // CELL_BLOCKS
+        rows, cols = (
+            slice(axis.start // step * MULTIPLE, -(-axis.stop // step) * MULTIPLE)
+            for axis in box_around(enough, (margin, margin))
+        )
+        return rows, cols
 
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""

@@ -23,10 +23,9 @@ TEMPERATURE = 1.5
 """Of the planes given that there is a surface: with it the confidence is right on average, of scenes that the
 network was not trained on (docs/experiments/depth.md; temperature scaling, Guo et al. 2017)."""
 BAND_VALUES = 1 << 20
-"""Blocks times planes whose last step is done at once, which takes 0.2 GB."""
+"""Blocks times planes whose last step is done at once by a thread, which takes 0.2 GB."""
 
-
-NEAR_PX = 10.0
+FOCUS_PX = 10.0
 """What is farther from a requested plane in total disparity has a blur half-extent above 5 px, and is
 defocused as far as its depth says."""
 MIN_NEAR = 1e-3
@@ -49,9 +48,9 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     first, 1.5 lies between the second and the third. `inputs.hint` holds the same request.
     """
     import onnxruntime
-    from scipy.special import expit, logsumexp, softmax
+    from scipy.special import expit, softmax
 
-    from pcii.base.compiled_loops import threads
+    from pcii.base.compiled_loops import each_in_threads, threads
 
     trunk, head = _sessions(threads())
     options = onnxruntime.RunOptions()
@@ -59,8 +58,8 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
     Z, h, w = inputs.evidence.shape
     # The network takes several films at once; here it is one.
-    given = {name: part[None] for name, part in inputs._asdict().items()}
-    *of_cells, cell_nothing = map(np.asarray, trunk.run(None, given, options))
+    batch = {name: part[None] for name, part in inputs._asdict().items()}
+    *of_cells, cell_nothing = map(np.asarray, trunk.run(None, batch, options))
     nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     in_focus = np.empty((requested_planes.size, h, w), np.float32)
@@ -68,52 +67,63 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     upper = np.minimum(lower + 1, Z - 1)
     near = near_requested(Z, requested_planes)
     upper_share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
+    names = [argument.name for argument in head.get_inputs()]
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
-    for top in range(0, h, rows):
+
+    def run_head(top: int, options: onnxruntime.RunOptions | None = None) -> None:
         end = min(top + rows, h)
         # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
         first, last = max(top - CELL_SIDE_BLOCKS, 0), min(end + CELL_SIDE_BLOCKS, h)
         cells = np.s_[:, :, first // CELL_SIDE_BLOCKS : last // CELL_SIDE_BLOCKS]
         blocks = np.s_[:, :, first:last]
-        parts = (
-            *(part[cells] for part in of_cells),
-            given["evidence"][blocks],
-            given["brightness"][blocks],
-        )
-        names = [argument.name for argument in head.get_inputs()]
-        logit, mask = head.run(["logit", "mask"], dict(zip(names, parts, strict=True)), options)
-        own, masks = (np.asarray(part)[0, :, top - first : end - first] for part in (logit, mask))
-        none[top:end] = expit(nothing[top:end] - logsumexp(own, axis=0))
-        probability[:, top:end] = softmax(own / np.float32(TEMPERATURE), axis=0) * (1 - none[top:end])
-        at_planes = (1 - upper_share) * masks[lower] + upper_share * masks[upper]
-        of_planes = np.tensordot(near, softmax(own, axis=0) * (1 - none[top:end]), axes=1)
+        parts = *(part[cells] for part in of_cells), batch["evidence"][blocks], batch["brightness"][blocks]
+        outputs = head.run(["logit", "mask"], dict(zip(names, parts, strict=True)), options)
+        logit, mask = (np.asarray(part)[0, :, top - first : end - first] for part in outputs)
+        largest = logit.max(axis=0)
+        logit = logit - largest
+        weight = np.exp(logit)
+        total = weight.sum(axis=0)
+        none[top:end] = expit(nothing[top:end] - largest - np.log(total))
+        some = 1 - none[top:end]
+        logit /= np.float32(TEMPERATURE)
+        tempered = np.exp(logit, out=logit)
+        np.multiply(tempered, some / tempered.sum(axis=0), out=probability[:, top:end])
+        of_planes = np.tensordot(near, weight, axes=1) * (some / total)
         of_none = np.maximum(1 - of_planes.sum(axis=0, keepdims=True), 0)
+        at_planes = (1 - upper_share) * mask[lower] + upper_share * mask[upper]
         logits = np.concatenate([at_planes + np.log(of_planes + MIN_NEAR), np.log(of_none + MIN_NEAR)])
         in_focus[:, top:end] = softmax(logits, axis=0)[:-1]
+
+    *others, last = range(0, h, rows)
+    each_in_threads(run_head, others)
+    run_head(last, options)
     return NetworkOutputs(probability, none, in_focus)
 
 
 def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
     """Which of Z planes, 1 px of total disparity apart, are near each requested one: (R, Z) float32, 0 or 1.
 
-    A plane is near the closest requested one, if within `NEAR_PX`; NaN requests nothing.
+    A plane is near the closest requested one, if within `FOCUS_PX`; NaN requests nothing.
     """
     if requested_planes.size == 0:
         return np.zeros((0, Z), np.float32)
     distance = np.abs(np.arange(Z) - np.nan_to_num(requested_planes, nan=np.inf)[:, None])
     is_closest = distance.argmin(axis=0) == np.arange(requested_planes.size)[:, None]
-    return (is_closest & (distance <= NEAR_PX)).astype(np.float32)
+    return (is_closest & (distance <= FOCUS_PX)).astype(np.float32)
 
 
 @cache
 def _sessions(threads: int) -> "tuple[InferenceSession, InferenceSession]":
-    """The network up to cells of 4 px, and its last step, on so many threads."""
+    """The network up to cells of 4 px, on so many threads, and its last step, on one of each caller."""
     import onnxruntime
 
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    trunk, head = (
-        onnxruntime.InferenceSession(WEIGHTS / f"{name}.onnx", options, providers=["CPUExecutionProvider"])
-        for name in ("trunk", "head")
-    )
-    return trunk, head
+    def session(name: str, threads: int) -> "InferenceSession":
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        # Threads that wait by spinning would take the cores of other processes.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        return onnxruntime.InferenceSession(
+            WEIGHTS / f"{name}.onnx", options, providers=["CPUExecutionProvider"]
+        )
+
+    return session("trunk", threads), session("head", 1)

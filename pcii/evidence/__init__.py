@@ -11,6 +11,8 @@ hot_pixels          Hot pixels at the same place of all cameras, which belong to
                     scene.
 label_kernels       Compiled loops over cells: evidence summed between edges, and labels by belief
                     propagation.
+octave_kernels      Compiled: means of the blocks of a section, and the evidence of octaves, from fine to
+                    coarse and back.
 prediction_kernels  Compiled: the rate of each photon's pixel and colour, estimated from all other photons
                     of a section.
 prediction_types    Arguments and results of the compiled loops that predict photons; importing them needs

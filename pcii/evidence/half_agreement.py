@@ -230,7 +230,12 @@ def _products(
 
     `sums` and `samples` (Z, 2, h, w) are those of the halves in cells.
     """
-    planes = [_products_of_plane(sums[z], samples[z], side, is_counted=is_counted) for z in used]
+    from pcii.base.compiled_loops import each_in_threads
+
+    def of_plane(z: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return _products_of_plane(sums[z], samples[z], side, is_counted=is_counted)
+
+    planes = each_in_threads(of_plane, used.tolist())
     return Products(*(np.stack(part) for part in zip(*planes, strict=True)))
 
 

@@ -24,9 +24,8 @@ radiance has the variance of the views' samples in place of b, so that a plane a
 little evidence.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -75,8 +74,6 @@ planes up to 2 px of total disparity apart have the same shifts. With 3/4 the er
 size and twice the frequency, the least for one number for all cameras. The section lies 1/4 px off, an eighth
 of a block.
 """
-SAMPLES, SUMS, SPREAD = 0, 1, -1
-"""Places of the number of samples, of their sum and of its variance in the values of blocks."""
 CELL_BLOCKS = 4
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
 """What is divided by where there are no samples, or no light."""
@@ -91,91 +88,100 @@ def evidence_of_texture(
     is at this plane. A mosaic has all colours in a block of 2 pixels or more, for any shift.
     """
     from pcii.base.compiled_loops import each_in_threads
+    from pcii.evidence.octave_kernels import add_saturated
 
     planes = replace(planes, rounding=ROUNDING)
     chosen = model or TextureModel()
     colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
+    if isinstance(data, PhotonCounts):
+        data = replace(data, cfa=None)  # colours are summed, sooner is faster
     least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
     scale = binary_scale(data) if isinstance(data, Views) else 1.0
+    h, w = (-(-size // block_px) for size in data.grid.shape_HW)
+    nats, sums, samples = (np.empty((len(planes), h, w), np.float32) for _ in range(3))
 
-    h, w = -(-data.grid.height // block_px), -(-data.grid.width // block_px)
+    def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
+        own = planes.take([plane])
+        blocks = _block_sums(data, own, block_px, scale)
+        number = colours * _samples_of_blocks(own, 0, block_px), _samples_of_blocks(own, 1, block_px)
+        sums[plane] = blocks[0][:h, :w]
+        np.outer(number[0][:h], number[1][:w], out=samples[plane])
+        of_cells, spread = (block_sums(part, CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1]))
+        return _of_section(blocks, number, chosen, least_samples), of_cells**2 / np.maximum(
+            spread, LEAST_RATE
+        )
 
-    def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-        blocks = _block_sums(data, planes.take([plane]), block_px, scale)
-        cells = [block_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
-        photons = cells[SUMS] ** 2 / np.maximum(cells[SPREAD], LEAST_RATE)
-        octaves = _of_section(blocks, chosen, least_samples)
-        return octaves, blocks[SUMS][:h, :w], blocks[SAMPLES][:h, :w], photons
+    octaves, photons = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
+    largest = [reduce(np.maximum, each).clip(min=0) for each in zip(*octaves, strict=True)]
 
-    octaves, *others = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
-    largest = [np.maximum(np.max(each, axis=0), 0) for each in zip(*octaves, strict=True)]
-    nats = each_in_threads(lambda excess: _summed(_saturated(excess, largest, chosen))[:h, :w], octaves)
-    return TextureEvidence(np.stack(nats), *(np.stack(each) for each in others))
+    def sum_octaves(plane: int) -> None:
+        total = np.empty((0, 0), np.float32)
+        for octave in reversed(range(chosen.octaves)):
+            # The first two octaves have the same grid.
+            own, step = octaves[plane][octave], 2 if octave > 0 else 1
+            add_saturated(own, largest[octave], chosen.saturation_nats, total, step)
+            total = own
+        nats[plane] = total[:h, :w]
+
+    each_in_threads(sum_octaves, range(len(planes)))
+    return TextureEvidence(nats, sums, samples, np.stack(photons))
 
 
 def _block_sums(
     data: PhotonCounts | Views, plane: FocalPlanes, block_px: int, scale: float
 ) -> list[np.ndarray]:
-    """The number of samples, their sum and the variance of the sum (h, w) in the blocks of one section.
+    """The sum of samples (h, w) in the blocks of one section, and of radiance the variance of the sum.
 
-    Radiance is in units of `scale`. Of photon counts the last two are the same, and the sum is the last.
-    Sizes are rounded up to multiples of a cell, with empty blocks.
+    They are float32; radiance is in units of `scale`. Sizes are rounded up to multiples of a cell, with empty
+    blocks.
     """
-    is_counted = isinstance(data, PhotonCounts)
-    section = reconstruct(data, plane, variance=not is_counted)
 
     def in_blocks(values: np.ndarray) -> np.ndarray:
         blocks = block_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
         return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
 
-    blocks = [
-        in_blocks(section.coverage[0]),
-        in_blocks(section.counts[0] if scale == 1 else section.counts[0] / scale),
-    ]
-    if section.variance is not None:  # else that of a Poisson variable, its mean
-        variance = section.variance[0] if scale == 1 else section.variance[0] / scale / scale
-        blocks.append(in_blocks(variance * section.coverage[0]))
-    return blocks
+    section = reconstruct(data, plane, variance=isinstance(data, Views))
+    if section.variance is None:  # it is that of a Poisson variable, its mean
+        return [in_blocks(section.counts[0])]
+    variance = section.variance[0] / scale / scale
+    return [in_blocks(section.counts[0] / scale), in_blocks(variance * section.coverage[0])]
 
 
-def _of_section(blocks: list[np.ndarray], model: TextureModel, least_samples: float) -> list[np.ndarray]:
-    """The e of each octave on its own grid, from the values of `_block_sums`."""
-    from scipy.ndimage import gaussian_filter
+def _samples_of_blocks(plane: FocalPlanes, axis: int, block_px: int) -> np.ndarray:
+    """Pixels of all camera rows, or columns, in each row or column of blocks: float32, as many as blocks."""
+    size, shift = plane.grid.shape_HW[axis], plane.whole_shifts_px[axis][0]
+    edges = np.minimum(block_px * np.arange(-(-size // block_px) + 1), size)
+    # The pixels of a shifted row before each edge.
+    before = np.clip(edges - np.maximum(shift, 0)[:, None], 0, np.maximum(size - np.abs(shift), 0)[:, None])
+    blocks = np.diff(before.sum(axis=0)).astype(np.float32)
+    return np.pad(blocks, (0, -blocks.size % CELL_BLOCKS))
 
-    parts, excess = blocks, list[np.ndarray]()
+
+def _of_section(
+    blocks: list[np.ndarray], number: tuple[np.ndarray, ...], model: TextureModel, least_samples: float
+) -> list[np.ndarray]:
+    """The e of each octave on its own grid, from the values of `_block_sums` and `_samples_of_blocks`."""
+    from scipy.ndimage import gaussian_filter1d
+
+    from pcii.evidence.octave_kernels import gaussian_mean, octave_evidence
+
+    excess = list[np.ndarray]()
     for octave in range(model.octaves):
         if octave > 1:
-            parts = [block_sums(part, 2, np.float32) / 4 for part in parts]
-        finer, parts = parts, [gaussian_filter(part, _blur(octave), mode="constant") for part in parts]
-        mean, around = (part[SUMS] / np.maximum(part[SAMPLES], LEAST_SAMPLES) for part in (finer, parts))
-        number = np.maximum(parts[SAMPLES], LEAST_SAMPLES)
-        noise = _noise_weight(octave) * np.maximum(parts[SPREAD], 0) / number**2
-        noise = np.maximum(noise, LEAST_RATE**2) + (model.averaging_error * around) ** 2
-        texture = (model.contrast * around) ** 2
-        share = np.where(parts[SAMPLES] >= least_samples, texture / (noise + texture), 0)
-        excess.append(share * ((mean - around) ** 2 / noise - 1) / 2)
+            blocks = [block_sums(part, 2, np.float32) / 4 for part in blocks]
+            number = tuple(map(_halved, number))
+        finer = blocks[0], *number
+        blocks = [gaussian_mean(part, _weights(octave)) for part in blocks]
+        number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
+        of_model = _noise_weight(octave), model.averaging_error, model.contrast
+        constants = np.array([*of_model, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
+        excess.append(octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))
     return excess
 
 
-def _saturated(
-    excess: Sequence[np.ndarray], largest: Sequence[np.ndarray], model: TextureModel
-) -> list[np.ndarray]:
-    """The e of each octave, reduced by how large it is at any plane; what is below 0 is left as it is."""
-    return [
-        np.where(each > 0, each / (1 + most / model.saturation_nats), each)
-        for each, most in zip(excess, largest, strict=True)
-    ]
-
-
-def _summed(octaves: Sequence[np.ndarray]) -> np.ndarray:
-    """Sum of values of octaves per block (h, w): a coefficient of an octave stands for 4^octave blocks."""
-    total = octaves[-1]
-    for octave in reversed(range(len(octaves) - 1)):
-        if octave > 0:  # the first two octaves have the same grid
-            h, w = octaves[octave].shape  # an odd one has one row less than twice its half
-            total = _expanded(total)[:h, :w]
-        total = octaves[octave] + total / 4
-    return total
+def _halved(number: np.ndarray) -> np.ndarray:
+    """Means of pairs; half of the last where it has no other."""
+    return np.pad(number, (0, number.size % 2)).reshape(-1, 2).sum(axis=1) / np.float32(2)
 
 
 def _blur(octave: int) -> float:
@@ -184,6 +190,14 @@ def _blur(octave: int) -> float:
     From single blocks to 1 in the finest octave, then from 1 to 2.
     """
     return 1.0 if octave == 0 else 3.0**0.5
+
+
+@cache
+def _weights(octave: int) -> np.ndarray:
+    """Weights (R + 1,) float32 of blocks 0 to R away in the blur of an octave, 4 standard deviations."""
+    away = np.arange(int(4 * _blur(octave) + 0.5) + 1)
+    weight = np.exp(-((away / _blur(octave)) ** 2) / 2)
+    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)
 
 
 @cache
@@ -202,14 +216,3 @@ def _noise_weight(octave: int) -> float:
     around = gaussian_filter1d(own, _blur(octave), axis=0, mode="constant")
     a, b = own[own.shape[0] // 2], around[own.shape[0] // 2]
     return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)
-
-
-def _expanded(values: np.ndarray) -> np.ndarray:
-    """Twice the size in both axes (h, w), interpolated between centres; continued beyond the borders."""
-    return _expanded_rows(_expanded_rows(values).T).T
-
-
-def _expanded_rows(values: np.ndarray) -> np.ndarray:
-    padded = np.pad(values, ((1, 1), (0, 0)), mode="edge")
-    sides = np.stack([padded[:-2], padded[2:]], axis=1)
-    return ((3 * values[:, None] + sides) / 4).reshape(2 * values.shape[0], -1)

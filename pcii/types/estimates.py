@@ -120,11 +120,13 @@ class DepthPosterior(ShortForm):
 
         The last, in px of total disparity, is the mean over the plane and two on either side.
         """
-        near = self.probability.copy()
-        near[1:] += self.probability[:-1]
-        near[:-1] += self.probability[1:]
-        plane = near.argmax(axis=0)
-        confidence = np.minimum(np.take_along_axis(near, plane[None], axis=0)[0], 1.0)
+        padded = [0.0, *self.probability, 0.0]
+        confidence, plane = np.full_like(self.no_surface, -1), np.zeros(self.no_surface.shape, int)
+        for z, (before, own, after) in enumerate(zip(padded, padded[1:], padded[2:], strict=False)):
+            near = own + before + after
+            plane[near > confidence] = z
+            np.maximum(confidence, near, out=confidence)
+        confidence = np.minimum(confidence, 1.0)
         at = plane + np.arange(-2, 3)[:, None, None]
         inside = (at >= 0) & (at < len(self.planes))
         at = np.clip(at, 0, len(self.planes) - 1)

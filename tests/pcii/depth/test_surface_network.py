@@ -89,18 +89,30 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
     samples, hint = grid.view_count * METHOD.block_px**2, hint_of(planes.total_disparity_px, np.array([4.0]))
-    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1, hint=hint)
+    film = slice(0, 2 * -(-evidence.nats.shape[1] // 2)), slice(0, 2 * -(-evidence.nats.shape[2] // 2))
+    own = inputs_of(evidence, samples, SurfacePrior(), film, hint)
     turned = inputs_of(
         evidence._replace(
             nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
         ),
         samples,
         SurfacePrior(),
-        multiple=1,
-        hint=hint,
+        film,
+        hint,
     )
     for part, other in zip(own[:4], turned[:4], strict=True):
         np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
+
+
+def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
+    """To the last bit, the mirrored end of the film included."""
+    planes = FocalPlanes.at_total_disparity(two_squares.counts.grid, np.arange(2.0, 5.0))
+    evidence = evidence_of_texture(two_squares.counts, planes)
+    film = METHOD.network_inputs(evidence, planes, 2, np.zeros(0))
+    h, w = film.evidence.shape[1:]
+    part = METHOD.network_inputs(evidence, planes, 2, np.zeros(0), (slice(h - 96, h), slice(32, w)))
+    for whole, own, side in zip(film[:4], part[:4], (1, 1, 2, 2), strict=True):
+        assert np.array_equal(whole[:, (h - 96) // side :, 32 // side :], own)
 
 
 def test_a_hint_says_how_near_a_plane_is_to_the_nearest_requested_one() -> None:

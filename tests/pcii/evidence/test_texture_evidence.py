@@ -1,10 +1,15 @@
 """Evidence of texture: none of noise on average, and largest where texture is in focus."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 from twins import even_light, unit_grid
 
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
+from pcii.imaging.blocks import block_sums
+from pcii.sections.reconstruction import reconstruct
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
 
@@ -34,6 +39,30 @@ def test_it_is_largest_in_focus_and_bounded(two_squares) -> None:
     assert nats[:, at_third].sum(axis=1).argmax() == 2
     octaves = sum(4.0**-octave for octave in range(TextureModel().octaves))
     assert nats.max() <= TextureModel().saturation_nats * octaves
+
+
+def test_two_octaves_are_those_of_the_equations() -> None:
+    grid, model = unit_grid(3, 4, 67, 90), TextureModel(octaves=2, saturation_nats=1e12)
+    counts = even_light(grid, 2.0, 5, "GRBG")
+    planes = replace(FocalPlanes.at_depths(grid, [0.3, 0.8]), rounding=0.75)
+    section = reconstruct(counts, planes)
+    colours_apart = section.counts, section.coverage
+    fine = [block_sums(part.sum(axis=-1, dtype=float), 2, float) for part in colours_apart]
+    fine = [np.pad(part, [(0, 0), *((0, -size % 4) for size in part.shape[1:])]) for part in fine]
+    impulse, expected = np.zeros((99, 99)), np.zeros(1)
+    impulse[49, 49] = 1
+    for octave, sigma in enumerate((1.0, 3**0.5)):
+        coarse = [gaussian_filter(part, sigma, mode="constant", axes=(1, 2)) for part in fine]
+        wider = gaussian_filter(impulse, sigma)
+        y, b = (total / np.maximum(number, 1e-3) for total, number in (fine, coarse))
+        v = ((impulse - wider) ** 2).sum() * coarse[0] / np.maximum(coarse[1], 1e-3) ** 2
+        v = np.maximum(v, 1e-24) + (model.averaging_error * b) ** 2
+        r = (model.contrast * b) ** 2 / v
+        e = r / (1 + r) * ((y - b) ** 2 / v - 1) / 2
+        expected = expected + np.where(coarse[1] >= model.least_coverage * 12 * 4, e, 0) / 4**octave
+        fine, impulse = coarse, wider
+    nats = evidence_of_texture(counts, planes, model=model).nats
+    np.testing.assert_allclose(nats, expected[:, :34, :45], rtol=2e-4, atol=2e-6)
 
 
 def test_the_bound_keeps_how_planes_compare() -> None:
