@@ -132,16 +132,18 @@ def with_yardsticks(frame: "DataFrame") -> "DataFrame":
     import pandas as pd
 
     keys = [name for name in HEAD if name != "method"] + ["photons_per_view"]
+    columns = [str(column) for column in frame.columns]
     names = {
-        prefix: {name: name.replace(f"{prefix}.", "") for name in frame if f"{prefix}." in name}
+        prefix: {name: name.replace(f"{prefix}.", "") for name in columns if f"{prefix}." in name}
         for prefix in YARDSTICKS
     }
     parts = [frame.drop(columns=[name for own in names.values() for name in own])]
     for prefix, own in names.items():
         known = frame[[*keys, *own]].dropna(how="all", subset=[*own])
         known = known.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=own)
-        zeros = known[[*own.values()]] * 0.0
-        parts += [known.assign(method=YARDSTICKS[prefix]), known.assign(**zeros, method=NOTHING)]
+        nothing = known.assign(method=NOTHING)
+        nothing[[*own.values()]] *= 0.0
+        parts += [known.assign(method=YARDSTICKS[prefix]), nothing]
     return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
 
 
