@@ -195,8 +195,8 @@ WITH_LIKELIHOOD = "10 × 10", "3 × 3", "2 × 2", "1 × 2"
 """Sets of which the likelihood method, which takes a minute there, is tried on the room."""
 METHODS = "likelihood", "three-step", "posterior"
 OF_ABSTENTION = "3 × 3", "1 × 9", "9 × 1", "1 × 2", "chessboard of 13 in 5 × 5"
-HEAD = "scene", "cameras", "difference_px", "photons", "draw"
-Key = tuple[str, str, float, int, int]
+HEAD = "scene", "cameras", "difference_px", "photons"
+Key = tuple[str, str, float, int]
 Row = dict[str, float]
 
 
@@ -204,11 +204,11 @@ def works() -> Iterator[Key]:
     """What is measured: all sets in all light at one baseline, some at all baselines in the same light."""
     for scene, view in SCENES.items():
         for cameras, photons in product(SETS, view.photons):
-            yield scene, cameras, USUAL_PX, photons, 1
+            yield scene, cameras, USUAL_PX, photons
     for scene, view in SCENES.items():
         for cameras, difference_px in product(OF_BASELINES, DIFFERENCES_PX):
             if difference_px != USUAL_PX:
-                yield scene, cameras, difference_px, view.usual_photons, 1
+                yield scene, cameras, difference_px, view.usual_photons
 
 
 def grid_of(cameras: CameraSet, difference_px: float) -> pcii.CameraGrid:
@@ -238,7 +238,7 @@ def drawn(scene: str, rows: int, cols: int, difference_px: float) -> tuple[pcii.
     return counts, replace(truth, photons=None)  # which are of these counts, not of samples
 
 
-def measure(scene: str, cameras: str, difference_px: float, photons: int, draw: int) -> Row:
+def measure(scene: str, cameras: str, difference_px: float, photons: int) -> Row:
     """Scores of depth and removal, and of whoever looks at no photon."""
     of = SETS[cameras]
     counts, truth = drawn(scene, of.rows, of.cols, difference_px)
@@ -247,7 +247,7 @@ def measure(scene: str, cameras: str, difference_px: float, photons: int, draw: 
         is_working = ~of.is_dead[e.k, e.l]
         k, l, i, j, n = (column[is_working] for column in (e.k, e.l, e.i, e.j, e.n))
         counts = pcii.PhotonCounts.from_events(k, l, i, j, n, counts.grid, cfa=counts.cfa)
-    counts = counts.subsample(100 * photons, np.random.default_rng((draw, photons)))
+    counts = counts.subsample(100 * photons, np.random.default_rng((1, photons)))
     view = SCENES[scene]
     z_mm = view.scene.planes_mm
     posterior = depth_posterior(counts, view.z_range_mm, z_mm=z_mm)
@@ -272,7 +272,6 @@ def measure(scene: str, cameras: str, difference_px: float, photons: int, draw: 
         "one_depth": depth["one_depth"]["within_1px"],
         "within_1px": depth["within_1px"],
         "within_3px": depth["within_3px"],
-        "quadratic_score": depth["quadratic_score"],
         "answered": depth["coverage"],
         "surface": float(is_surface[on_object].mean()),
         "best_within_1px": float((np.abs(best_px - true_px)[on_object] <= 1).mean()),
@@ -302,8 +301,8 @@ def _read(file: Path) -> dict[Key, Row]:
         lines = list(csv.DictReader(stream))
     rows: dict[Key, Row] = {}
     for line in lines:
-        scene, cameras, difference_px, photons, draw = (line.pop(name) for name in HEAD)
-        key = scene, cameras, float(difference_px), int(photons), int(draw)
+        scene, cameras, difference_px, photons = (line.pop(name) for name in HEAD)
+        key = scene, cameras, float(difference_px), int(photons)
         rows[key] = {name: float(value) for name, value in line.items()}
     return rows
 
@@ -319,7 +318,7 @@ def page(rows: Mapping[Key, Row]) -> str:
     """The page, of which every figure is one of the rows."""
 
     def of(scene: str, cameras: str, photons: int, name: str, difference_px: float = USUAL_PX) -> float:
-        return rows[scene, cameras, difference_px, photons, 1][name]
+        return rows[scene, cameras, difference_px, photons][name]
 
     def cell(row: Row, name: str, yardstick: str) -> str:
         value = row[name]
@@ -335,7 +334,7 @@ def page(rows: Mapping[Key, Row]) -> str:
 
         def lines() -> Iterator[tuple[str, ...]]:
             for cameras in SETS:
-                own = [rows[scene, cameras, USUAL_PX, n, 1] for n in light]
+                own = [rows[scene, cameras, USUAL_PX, n] for n in light]
                 yield (
                     cameras,
                     *(
@@ -359,7 +358,7 @@ def page(rows: Mapping[Key, Row]) -> str:
 
         def lines() -> Iterator[tuple[str, ...]]:
             for cameras in SETS:
-                own = [rows[scene, cameras, USUAL_PX, n, 1] for n in light]
+                own = [rows[scene, cameras, USUAL_PX, n] for n in light]
                 yield cameras, *(cell(row, method, "everything") for row in own for method in METHODS)
             everything = f"{of(scene, '10 × 10', light[0], 'everything'):.2f}"
             yield "everything", *([everything] * len(light) * len(METHODS))
@@ -374,7 +373,7 @@ def page(rows: Mapping[Key, Row]) -> str:
 
         def lines() -> Iterator[tuple[str, ...]]:
             for scene, cameras, difference_px in product(SCENES, OF_BASELINES, DIFFERENCES_PX):
-                row = rows[scene, cameras, difference_px, SCENES[scene].usual_photons, 1]
+                row = rows[scene, cameras, difference_px, SCENES[scene].usual_photons]
                 step_px = difference_px / (max(SETS[cameras].rows, SETS[cameras].cols) - 1)
                 yield (
                     scene, cameras, f"{difference_px:g}", f"{step_px:.1f}",
@@ -391,7 +390,7 @@ def page(rows: Mapping[Key, Row]) -> str:
         def lines() -> Iterator[tuple[str, ...]]:
             for scene, view in SCENES.items():
                 for cameras, photons in product(OF_ABSTENTION, view.photons[-2:]):
-                    row = rows[scene, cameras, USUAL_PX, photons, 1]
+                    row = rows[scene, cameras, USUAL_PX, photons]
                     yield (
                         scene,
                         cameras,
