@@ -36,8 +36,8 @@ is said:
 {known}
 
 **The baseline** is counted in px of total disparity, (N − 1) focal pitch / (z pixel), between the nearest
-and the farthest of what is to be told apart ([scores](scores.md#units)). Some 5 px are a good plan for any
-set, up to 10 px with 3 × 3 cameras or more that see texture. A longer one makes a px fewer mm, and more
+and the farthest of what is to be told apart ([scores](scores.md#units)). Some 5 px are a good plan, with few
+cameras too, up to 10 px with 3 × 3 cameras or more that see texture. A longer one makes a px fewer mm, and more
 pixels wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer cameras, the
 shorter it must be: what decides is the disparity between neighbours.
 
@@ -283,7 +283,7 @@ def measure(scene: str, cameras: str, difference_px: float, photons: int) -> Row
 
 def measured(file: Path) -> dict[Key, Row]:
     """All measurements; those that the file lacks are made and added to it."""
-    rows = _read(file) if file.is_file() else {}
+    rows = read(file) if file.is_file() else {}
     for key in works():
         if key not in rows:
             rows[key] = measure(*key)
@@ -296,7 +296,8 @@ def measured(file: Path) -> dict[Key, Row]:
     return rows
 
 
-def _read(file: Path) -> dict[Key, Row]:
+def read(file: Path) -> dict[Key, Row]:
+    """The measurements that a file has."""
     with file.open(newline="", encoding="utf-8") as stream:
         lines = list(csv.DictReader(stream))
     rows: dict[Key, Row] = {}
@@ -466,7 +467,7 @@ def page(rows: Mapping[Key, Row]) -> str:
                         "no: "
                         + span("room", tuple(SETS), "within_1px", room[:1])
                         + ", no better than one depth",
-                        "no",
+                        "hardly",
                     ),
                     (
                         "2 × 2 or 1 × 2 cameras, a bright room",
