@@ -36,10 +36,10 @@ is said:
 {known}
 
 **The baseline** is counted in px of total disparity, (N − 1) focal pitch / (z pixel), between the nearest
-and the farthest of what is to be told apart ([scores](scores.md#units)). Some 5 px are a good plan, with few
-cameras too, up to 10 px with 3 × 3 cameras or more that see texture. A longer one makes a px fewer mm, and more
-pixels wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer cameras, the
-shorter it must be: what decides is the disparity between neighbours.
+and the farthest of what is to be told apart ([scores](scores.md#units)). Some 5 px are a good plan, with
+few cameras too, up to 10 px with 3 × 3 cameras or more that see texture. A longer one makes a px fewer mm,
+and more pixels wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer
+cameras, the shorter it must be: what decides is the disparity between neighbours.
 
 ## How it was measured
 
