@@ -1,6 +1,7 @@
 """The site: every public name is in the reference, figures have one source."""
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -40,3 +41,9 @@ def test_figures_that_pages_quote_are_those_of_the_benchmarks(
         assert f"{number} {unit}" in text, f"{page}: {row}: {cell}"
         if unit == "×":
             assert interval.strip("()") in text, f"{page}: {row}: {cell}"
+
+
+def test_the_page_of_camera_sets_is_what_its_script_makes_of_the_measurements() -> None:
+    script = runpy.run_path(str(DOCS / "make_camera_sets.py"))
+    rows = script["read"](DOCS / "camera_sets.csv")
+    assert script["page"](rows) == (DOCS / "camera_sets.md").read_text(encoding="utf-8")
