@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 Size = Literal["quick", "full"]
 Parameter = str | int | float
 UNITS = {
-    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "bytes": "bytes",
+    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "mm": "mm",
+    "bits": "bits", "bytes": "bytes",
 }  # fmt: skip
 SPELLINGS = {
     "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000", "cpsnr": "CPSNR",
