@@ -112,14 +112,14 @@ def publish(out: Path) -> int:
     What is missing of the paper's scene is measured; submissions to the benchmark are read beside the folder.
     """
     records = records_in(out)
-    write_markdown(PAGE, STUDIES, records)
-    write_reference(records)
     content = read_figures()
     add_studies(content, records)
     place = {"machine": in_words(machine()), "date": f"{datetime.now(UTC):%Y-%m-%d}", "commit": commit()}
     command = {"command": f"python -m benchmarks publish, {paper_scene.SEEDS} draws of photons"}
     add(content, "paper", command | place, paper_scene.measure(out / paper_scene.FOLDER))
     add_benchmark(content, out.parent / "submissions")
+    write_markdown(PAGE, STUDIES, records)
+    write_reference(records)
     write_figures(content)
     print(f"wrote {PAGE.name}, its figures, those of all pages, and the reference of the guard")
     return 0

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pcii
-from benchmarks.results import Value
+from benchmarks.quoted import named_means
+from benchmarks.results import Value, mean_of
 from pcii.base.progress import Stages
-from pcii.evaluation.summary import lines_of, mean_interval
+from pcii.evaluation import summary
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.spec.sweeps import load_sweep
 
@@ -29,10 +30,7 @@ def measure(out: Path, seeds: int = SEEDS) -> Iterator[tuple[str, Value]]:
     with Stages() as progress:
         generate_collection(sweep, out / "data")
         evaluation = pcii.evaluate(folders, out / "scores", methods=METHODS, report=progress)
-    for mean in lines_of(evaluation.means()):
-        if mean.measure in MEASURES and not mean.method.startswith("("):
-            name = f"paper.{mean.measure}.{mean.method.removeprefix('depth:')}.{mean.light:g}"
-            yield name, Value(mean.mean, mean.low, mean.high)
+    yield from named_means("paper", summary.means(evaluation.frame), MEASURES)
     yield from _entropies(folders)
 
 
@@ -45,5 +43,5 @@ def _entropies(folders: list[Path]) -> Iterator[tuple[str, Value]]:
         tables.append(pcii.score(focus, None, dataset.truth).objects)
     for of_seeds in zip(*tables, strict=True):
         for z_mm in of_seeds[0]["entropy"]:
-            mean = mean_interval([row["entropy"][z_mm] for row in of_seeds], "positive")
-            yield f"paper.entropy_bits.{of_seeds[0]['name']}.{z_mm}", Value(mean.mean, mean.low, mean.high)
+            bits = mean_of(row["entropy"][z_mm] for row in of_seeds)
+            yield f"paper.entropy_bits.{of_seeds[0]['name']}.{z_mm}", bits

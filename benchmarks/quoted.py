@@ -6,21 +6,25 @@ publishing writes the text anew. A mark never begins a line: Markdown would take
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from benchmarks.machine import commit, in_words
 from benchmarks.page import told
-from benchmarks.results import UNITS, Parameter, Record, Value
+from benchmarks.results import UNITS, Parameter, Record, Value, value_of
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.benchmark_scores import by_scene
 from pcii.evaluation.rows import frame_of, origin_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import lines_of, means, means_over_scenes, with_yardsticks
+from pcii.evaluation.summary import lines_of, means, means_over_scenes
 from pcii.store.collection import IN_FRAMES
+from pcii.store.software import own_software
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 ROOT = Path(__file__).resolve().parent.parent
 FILE = ROOT / "docs" / "figures.json"
@@ -57,7 +61,7 @@ CELLS = {
         "collections", "made", "Time of each dataset of a collection", "time_ms", {"datasets": 40}
     ),
 }
-"""Figures of studies, at their quick size, by name."""
+"""Figures of studies by name."""
 
 
 def text_of(name: str, value: Value) -> str:
@@ -81,19 +85,18 @@ def read_figures() -> Content:
 def add(content: Content, source: str, about: Mapping[str, str], values: Iterable[tuple[str, Value]]) -> None:
     """Put the figures of a source in the place of those that it had."""
     kept = {name: each for name, each in content["figures"].items() if each["source"] != source}
+    new = {name: {"text": text_of(name, value), **asdict(value), "source": source} for name, value in values}
     content["sources"][source] = dict(about)
-    content["figures"] = kept | {
-        name: {"text": text_of(name, value), **asdict(value), "source": source} for name, value in values
-    }
+    content["figures"] = dict(sorted((kept | new).items()))
 
 
 def add_studies(content: Content, records: Iterable[Record]) -> None:
-    """Figures of the studies that have run."""
+    """Figures of the studies that have run at quick size: other sizes have other rows."""
     for record in records:
         own = {name: cell for name, cell in CELLS.items() if cell.study == record.study}
-        if own:
+        if own and record.size == "quick":
             about = {
-                "command": f"python -m benchmarks {record.study}" + " --full" * (record.size == "full"),
+                "command": f"python -m benchmarks {record.study}",
                 "machine": in_words(record.machine),
                 "date": record.date[:10],
                 "commit": record.versions.get("commit", "unknown"),
@@ -109,27 +112,28 @@ def _value(record: Record, cell: Cell) -> Value:
 
 
 def add_benchmark(content: Content, submissions: Path) -> None:
-    """Means over the scenes of the public benchmark, benchmark.measure.method.photons, of its submissions."""
+    """Means over the scenes of the public benchmark, of the submissions in a folder, if there are any."""
     rows = [row for file in sorted(submissions.glob(f"*/{SUBMISSION}")) for row in read_rows(file.parent)]
     if rows:
         origin = origin_of(rows)
+        is_of_this_source = all(own_software().items() <= row["software"].items() for row in rows)
         about = {
             "command": "pcii benchmark run METHOD --data out/pcii-bench-1 -o out/submissions/METHOD",
             "machine": ", ".join(origin["machines"]),
             "date": origin["days"][-1],
-            "commit": commit(),
+            "commit": commit() if is_of_this_source else "unknown",
         }
-        add(content, "benchmark", about, _of_benchmark(rows))
+        of_scenes = means(frame_of(by_scene(rows)))
+        of_scenes = of_scenes[~of_scenes["scene"].astype(str).str.endswith(IN_FRAMES)]
+        add(content, "benchmark", about, named_means("benchmark", means_over_scenes(of_scenes, {}), MEASURES))
 
 
-def _of_benchmark(rows: list[dict[str, Any]]) -> Iterator[tuple[str, Value]]:
-    of_scenes = means(with_yardsticks(frame_of(by_scene(rows))))
-    of_scenes = of_scenes[~of_scenes["scene"].astype(str).str.endswith(IN_FRAMES)]
-    for mean in lines_of(means_over_scenes(of_scenes, {})):
-        if mean.measure in MEASURES and not mean.method.startswith("("):
+def named_means(source: str, table: "DataFrame", measures: Collection[str]) -> Iterator[tuple[str, Value]]:
+    """Means of some measures by name: source.measure.method.photons."""
+    for mean in lines_of(table):
+        if mean.measure in measures:
             light = mean.light if isinstance(mean.light, str) else f"{mean.light:g}"
-            name = f"benchmark.{mean.measure}.{mean.method.removeprefix('depth:')}.{light}"
-            yield name, Value(mean.mean, mean.low, mean.high)
+            yield f"{source}.{mean.measure}.{mean.method.removeprefix('depth:')}.{light}", value_of(mean)
 
 
 def rewritten(page: str, text: str, figures: Mapping[str, Any]) -> str:

@@ -135,7 +135,11 @@ def mean_of(samples: Iterable[float]) -> Value:
 
     The interval is Student's of the mean's logarithm, so that it stays above 0.
     """
-    mean = mean_interval(list(samples), "positive")
+    return value_of(mean_interval(list(samples), "positive"))
+
+
+def value_of(mean: Any) -> Value:
+    """A mean of `pcii.evaluation`, whose one sample has no interval."""
     return Value(mean.mean) if mean.n == 1 else Value(mean.mean, mean.low, mean.high)
 
 
