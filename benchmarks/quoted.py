@@ -44,22 +44,19 @@ class Cell(NamedTuple):
     parameters: Mapping[str, Parameter] = {}
 
 
+PAPER, SECTIONS = "Photon counts of the paper's recipe", "Sections at the paper's size"
 CHART = "Nikon 5100 (NPL)", "Raw channels: mean error over patches and channels"
+COLLECTIONS = "Time of each dataset of a collection"
+RATIO = "thinning against dense with 16 samples, the paper's recipe"
 CELLS = {
-    "photons.paper_ms": Cell(
-        "photon-costs", "thinning, 1000 photons per view", "Photon counts of the paper's recipe", "time_ms"
-    ),
-    "photons.against_16_samples": Cell(
-        "photon-costs", "thinning against dense with 16 samples, the paper's recipe"
-    ),
-    "sections.events_ms": Cell("section-growth", "events", "Sections at the paper's size", "time_ms"),
-    "sections.dense_ms": Cell("section-growth", "dense, mean", "Sections at the paper's size", "time_ms"),
+    "photons.paper_ms": Cell("photon-costs", "thinning, 1000 photons per view", PAPER, "time_ms"),
+    "photons.against_16_samples": Cell("photon-costs", RATIO),
+    "sections.events_ms": Cell("section-growth", "events", SECTIONS, "time_ms"),
+    "sections.dense_ms": Cell("section-growth", "dense, mean", SECTIONS, "time_ms"),
     "sections.against_opencv": Cell("section-growth", "events against OpenCV, bilinear"),
     "colour.spectral_percent": Cell("colour", *CHART, "spectral_mode_percent", {"lamp": "A"}),
     "colour.rgb_percent": Cell("colour", *CHART, "rgb_mode_percent", {"lamp": "A"}),
-    "collections.dataset_ms": Cell(
-        "collections", "made", "Time of each dataset of a collection", "time_ms", {"datasets": 40}
-    ),
+    "collections.dataset_ms": Cell("collections", "made", COLLECTIONS, "time_ms", {"datasets": 40}),
 }
 """Figures of studies by name."""
 
