@@ -7,7 +7,8 @@
 #             those of depth
 # make bench-full     the same at full size: hours
 # make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
-# make bench-publish  make bench, then docs/benchmarks.md and the committed ratios from it; on an idle machine
+# make bench-publish  make bench, then docs/benchmarks.md, the committed ratios and the figures that pages quote from
+#             it; on an idle machine
 # make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours. Goes on
 #             from where it was stopped
 # make docs   the site of docs/*.md and the API, in out/docs

@@ -7,11 +7,12 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import depth, depth_constants, removal
+from benchmarks import depth, depth_constants, paper_scene, removal
 from benchmarks.figures import draw
 from benchmarks.guard import losses, read_reference, write_reference
-from benchmarks.machine import machine, versions, was_busy
+from benchmarks.machine import commit, in_words, machine, versions, was_busy
 from benchmarks.page import tables_of, write_html, write_markdown
+from benchmarks.quoted import add, add_benchmark, add_studies, read_figures, write_figures
 from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
 from pcii.base.errors import InputError
@@ -106,11 +107,21 @@ def guard(out: Path) -> int:
 
 
 def publish(out: Path) -> int:
-    """Write the page of the guide and the table of ratios from the results."""
+    """Write the page of the guide, the table of ratios and the figures that pages quote from the results.
+
+    What is missing of the paper's scene is measured; submissions to the benchmark are read beside the folder.
+    """
     records = records_in(out)
+    content = read_figures()
+    add_studies(content, records)
+    place = {"machine": in_words(machine()), "date": f"{datetime.now(UTC):%Y-%m-%d}", "commit": commit()}
+    command = {"command": f"python -m benchmarks publish, {paper_scene.SEEDS} draws of photons"}
+    add(content, "paper", command | place, paper_scene.measure(out / paper_scene.FOLDER))
+    add_benchmark(content, out.parent / "submissions")
     write_markdown(PAGE, STUDIES, records)
     write_reference(records)
-    print(f"wrote {PAGE.name}, its figures and the reference of the guard")
+    write_figures(content)
+    print(f"wrote {PAGE.name}, its figures, those of all pages, and the reference of the guard")
     return 0
 
 

@@ -2,6 +2,8 @@
 
 import os
 import platform
+import shutil
+import subprocess
 import time
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -31,14 +33,27 @@ def machine() -> dict[str, Any]:
     }
 
 
+def in_words(found: Mapping[str, Any]) -> str:
+    """Processor, cores and renderer of a machine."""
+    return f"{found['processor']}, {found['cores']} cores, {found['renderer']}"
+
+
+def commit() -> str:
+    """The commit of this source, with -dirty if files differ from it; "unknown" outside a repository."""
+    if not shutil.which("git"):
+        return "unknown"
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude", "*"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
+
+
 def was_busy(found: Mapping[str, Any]) -> bool:
     """Whether something else was running when a study began."""
     return found["cores_in_use"] > BUSY * found["cores"]
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of all packages that are measured; of extras, those that are installed."""
-    found = {"python": platform.python_version(), **dataset_versions()}
+    """Commit, and versions of Python and all packages that are measured; of extras, those installed."""
+    found = {"commit": commit(), "python": platform.python_version(), **dataset_versions()}
     found |= {name: version(name) for name in PEERS}
     for name in EXTRAS:
         if has(name):

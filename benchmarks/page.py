@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import draw
-from benchmarks.machine import was_busy
+from benchmarks.machine import in_words, was_busy
 from benchmarks.results import Record, Row, Study, Value, label
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.tables import Table, markdown
@@ -97,7 +97,7 @@ def _section(study: Study, record: Record) -> dict[str, Any]:
         "size": record.size,
         "date": date.fromisoformat(record.date[:10]).isoformat(),
         "wall_s": round(record.wall_s),
-        "machine": f"{machine['processor']}, {machine['cores']} cores, {machine['renderer']}",
+        "machine": in_words(machine),
         "busy": was_busy(machine),
         "cores_in_use": machine["cores_in_use"],
         "seeds": ", ".join(map(str, record.measured.seeds)),

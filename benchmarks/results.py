@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 Size = Literal["quick", "full"]
 Parameter = str | int | float
 UNITS = {
-    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "bytes": "bytes",
+    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "mm": "mm",
+    "bits": "bits", "bytes": "bytes",
 }  # fmt: skip
 SPELLINGS = {
     "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000", "cpsnr": "CPSNR",
@@ -134,7 +135,11 @@ def mean_of(samples: Iterable[float]) -> Value:
 
     The interval is Student's of the mean's logarithm, so that it stays above 0.
     """
-    mean = mean_interval(list(samples), "positive")
+    return value_of(mean_interval(list(samples), "positive"))
+
+
+def value_of(mean: Any) -> Value:
+    """A mean of `pcii.evaluation`, whose one sample has no interval."""
     return Value(mean.mean) if mean.n == 1 else Value(mean.mean, mean.low, mean.high)
 
 
