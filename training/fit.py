@@ -1,6 +1,6 @@
 """Train the network of depth and masks, on a GPU where there is one.
 
-    python -m training.fit EXAMPLES --out weights.pt --minutes 90 [--resume] [--anew]
+    python -m training.fit EXAMPLES --out weights.pt --minutes 90 [--resume] [--anew] [--masks]
 
 EXAMPLES is a folder made by `training.samples`. Training starts from the weights that ship, or with `--anew`
 from random ones. The objective is the sum of two cross-entropies, in nats per block of 2 px: of the true
@@ -8,6 +8,9 @@ plane, minus the logarithm of the probability of the two planes beside the true 
 or of no surface; and of the requested plane that the block's object belongs to, or none of them. One dataset
 in `HELD_OUT` is kept for the curve that is printed. With each line of it the state is written beside the
 weights, from which `--resume` goes on.
+
+With `--masks` only the layers that read the request and that say masks are trained, which a processor can do
+in an hour; depth without a request stays as it is.
 """
 
 import argparse
@@ -28,6 +31,8 @@ from training.requests import NOT_COUNTED
 
 RATE, WARM_UP, DECAY = 1e-3, 0.02, 1e-4
 """Largest step, share of the time in which it rises to it, weight decay."""
+MASKS_RATE = 3e-3
+"""The same of layers for requests and masks alone, which have some 100 weights."""
 AVERAGE = 0.998
 NO_SURFACE_WEIGHT = 0.5
 CURVE_ROWS = 10
@@ -50,12 +55,13 @@ def main() -> None:
     )
     parser.add_argument("--resume", action="store_true", help="go on from the state beside the weights")
     parser.add_argument("--anew", action="store_true", help="start from random weights")
+    parser.add_argument("--masks", action="store_true", help="train the layers for requests and masks alone")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)
-    training = Training(arguments.out)
+    training = Training(arguments.out, only_masks=arguments.masks)
     if arguments.resume:
         if not training.state.is_file():
             parser.error(f"--resume: there is no state {training.state}; leave it out to begin")
@@ -68,12 +74,14 @@ def main() -> None:
 class Training:
     """The network, the mean of its recent weights, and how far its training has come."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out: Path, *, only_masks: bool = False) -> None:
         self.network = SurfaceNetwork().to(DEVICE, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.averaged = copy.deepcopy(self.network)
-        self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), lr=RATE, weight_decay=DECAY, betas=(0.9, 0.99)
-        )
+        self.rate = MASKS_RATE if only_masks else RATE
+        for name, weights in self.network.named_parameters():
+            weights.requires_grad_(not only_masks or "hint" in name or "mask" in name)
+        trained = [weights for weights in self.network.parameters() if weights.requires_grad]
+        self.optimizer = torch.optim.AdamW(trained, lr=self.rate, weight_decay=DECAY, betas=(0.9, 0.99))
         self.steps, self.minutes = 0, 0.0
         self.weights, self.state = out, out.with_suffix(".state")
         self.curve = [list(COLUMNS)]
@@ -96,7 +104,7 @@ class Training:
                 share = minute / minutes
                 for group in self.optimizer.param_groups:
                     rise, fall = min(1, share / WARM_UP), 0.5 + 0.5 * np.cos(np.pi * share)
-                    group["lr"] = float(RATE * rise * fall + 1e-6)
+                    group["lr"] = float(self.rate * rise * fall + 1e-6)
                 losses.append(self._step(next(batches)))
                 if minute >= self.minutes + minutes / CURVE_ROWS:
                     self.minutes = minute

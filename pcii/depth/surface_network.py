@@ -28,6 +28,10 @@ BAND_VALUES = 1 << 20
 FOCUS_PX = 10.0
 """What is farther from a requested plane in total disparity has a blur half-extent above 5 px, and is
 defocused as far as its depth says."""
+REQUESTED_GAIN, REQUESTED_SIGMA_PX = 2.0, 2.0
+"""A surface at a requested plane is `1 + REQUESTED_GAIN` times as probable as one elsewhere, about it with a
+standard deviation in total disparity. With a larger gain or a smaller deviation depth is better in little
+light, and worse where objects are at planes that nobody requested (docs/experiments/depth.md)."""
 MIN_NEAR = 1e-3
 """Added to the probabilities of depths near a plane: of what the depth excludes, shapes may still tell."""
 
@@ -65,7 +69,7 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     in_focus = np.empty((requested_planes.size, h, w), np.float32)
     lower = np.clip(requested_planes.astype(int), 0, max(Z - 2, 0))
     upper = np.minimum(lower + 1, Z - 1)
-    near = near_requested(Z, requested_planes)
+    near, prior = near_requested(Z, requested_planes), depth_prior(Z, requested_planes)[:, None, None]
     upper_share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
     names = [argument.name for argument in head.get_inputs()]
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
@@ -87,8 +91,10 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
         some = 1 - none[top:end]
         logit /= np.float32(TEMPERATURE)
         tempered = np.exp(logit, out=logit)
+        tempered *= prior
         np.multiply(tempered, some / tempered.sum(axis=0), out=probability[:, top:end])
-        of_planes = np.tensordot(near, weight, axes=1) * (some / total)
+        weight *= prior
+        of_planes = np.tensordot(near, weight, axes=1) * (some / weight.sum(axis=0))
         of_none = np.maximum(1 - of_planes.sum(axis=0, keepdims=True), 0)
         at_planes = (1 - upper_share) * mask[lower] + upper_share * mask[upper]
         logits = np.concatenate([at_planes + np.log(of_planes + MIN_NEAR), np.log(of_none + MIN_NEAR)])
@@ -98,6 +104,15 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     each_in_threads(run_head, others)
     run_head(last, options)
     return NetworkOutputs(probability, none, in_focus)
+
+
+def depth_prior(Z: int, requested_planes: np.ndarray) -> np.ndarray:
+    """How probable a surface at each of Z planes is without any photon, relative to planes that nobody
+    requests: (Z,) float32. The request says that objects are near these planes.
+    """
+    offset_px = np.arange(Z) - requested_planes[:, None]
+    bumps = np.exp(-((offset_px / REQUESTED_SIGMA_PX) ** 2) / 2)
+    return (1 + REQUESTED_GAIN * bumps.sum(axis=0)).astype(np.float32)
 
 
 def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:

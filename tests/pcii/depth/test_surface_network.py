@@ -9,7 +9,7 @@ from pcii.depth import surface_network
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import SurfacePrior
-from pcii.depth.surface_network import near_requested, run_network
+from pcii.depth.surface_network import depth_prior, near_requested, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.types.estimates import DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
@@ -51,6 +51,13 @@ def test_each_depth_is_near_the_closest_requested_plane_within_reach() -> None:
     assert near[1].nonzero()[0].tolist() == list(range(15))
     assert near[0].nonzero()[0].tolist() == list(range(20, 40))
     assert near_requested(7, np.zeros(0)).shape == (0, 7)
+
+
+def test_a_requested_plane_is_three_times_as_probable_and_the_others_alike() -> None:
+    prior = depth_prior(60, np.array([20.0, 41.5]))
+    assert prior[[0, 20, 22, 59]] == pytest.approx([1, 3, 1 + 2 * np.exp(-0.5), 1], abs=1e-3)
+    assert prior[41] == prior[42]
+    np.testing.assert_array_equal(depth_prior(9, np.zeros(0)), np.ones(9))
 
 
 def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
