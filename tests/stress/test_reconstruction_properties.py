@@ -139,12 +139,15 @@ def test_colours_scale_with_the_light(raw: np.ndarray, cfa: str, power: int) -> 
 def test_agreement_is_a_share_and_knows_no_order(claimed: np.ndarray, seed: int) -> None:
     true = np.random.default_rng(seed).random(claimed.shape) < 0.5
     found, turned = mask_agreement(claimed, true), mask_agreement(true, claimed)
-    assert all(value is None or 0 <= value <= 1 for value in found.values())
-    assert found["iou"] == turned["iou"]
+    shares = [*found.pop("everything").values(), *found.values()]
+    assert all(value is None or 0 <= value <= 1 for value in shares)
     assert found["precision"] == turned["recall"]
+    if claimed.any() and true.any():
+        assert found["iou"] == turned["iou"]
     assert boundary_f(claimed, true) == pytest.approx(boundary_f(true, claimed))
     same = mask_agreement(claimed, claimed)
-    assert same["iou"] == same["f1"] == 1
+    assert same["false_share"] == 0
+    assert same["iou"] == same["f1"] == (1 if claimed.any() else None)
     if claimed.any() and not claimed.all():  # one that fills the frame has no outline, and 0
         assert same["boundary_f"] == 1
 
