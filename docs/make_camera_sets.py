@@ -96,17 +96,14 @@ two or four of 1 × 2 and 2 × 2 are as sharp as the detail itself, and meet tho
 baseline is longer than the distance between details.
 
 **A line of cameras is blind to edges along it.** They do not move (the aperture problem), and they stay
-sharp at every plane. Depth has an answer only where the structure that two halves of the cameras agree on
-is sharper in focus than out of focus ([half agreement](theory.md#half-agreement)); where a part of it is as
-sharp everywhere the difference is seldom large enough. This rule, and not the photons, silences 1 × 9 and 9
-× 1 on plain things in more light: the column *seen as a surface* counts what the network takes for one, and
-the last column what would be right if all were answered.
+sharp at every plane. With other arrays depth has an answer only where the structure that two halves of the
+cameras agree on is sharper in focus than out of focus ([half agreement](theory.md#half-agreement)). Of a
+line, and of any array in very little light, below 40 photons of all views in 8 × 8 px, the whole film is
+asked instead, whether the halves agree on any structure. What that leaves without an answer shows below: the
+column *seen as a surface* counts what the network takes for one, and the last column what would be right if
+all were answered.
 
 {abstention}
-
-In very little light, below 40 photons of all views in 8 × 8 px, the whole film is asked instead, whether
-there is structure at all, and a line passes. Textured things in good light, as in the room, have answers
-from a line as from a grid.
 
 **Two cameras** are one in each half, so that depth and the likelihood method work from two views on. A
 single view is refused. The three steps need 8 samples to reject a point by its variance, so that with fewer
@@ -445,11 +442,10 @@ def page(rows: Mapping[Key, Row]) -> str:
                     ),
                     (
                         "a row or a column of cameras, the same things",
-                        "in little light only: "
-                        + span("two objects", ("1 × 9", "9 × 1"), "answered", two[:1])
-                        + " answered with 100 photons, "
-                        + span("two objects", ("1 × 9", "9 × 1"), "answered", two[1:])
-                        + " with more",
+                        span("two objects", ("1 × 9", "9 × 1"), "within_3px", two)
+                        + " within 3 px, "
+                        + span("two objects", ("1 × 9", "9 × 1"), "within_1px", two)
+                        + " within 1 px",
                         "yes by likelihood: " + span("two objects", ("1 × 9", "9 × 1"), "likelihood", two),
                     ),
                     (

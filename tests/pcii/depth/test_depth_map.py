@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 from property_settings import mostly_slow
-from twins import bayer_photons, blocky_texture, even_light, unit_grid
+from twins import bayer_photons, blocky_texture, even_light, opaque_views, photons_of, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.depth.methods import estimate_depth
@@ -196,6 +196,21 @@ def test_a_range_that_is_not_near_to_far_is_refused(bad):
     with pytest.raises(InputError, match=r"^z_(range_)?mm: ") as caught:
         estimate_depth(counts, bad)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(1, 9), (9, 1)])
+def test_a_line_of_cameras_has_depths_of_plain_things_and_none_of_shaded_light(rows: int, cols: int) -> None:
+    """Edges along the line are as sharp out of focus, and so is shading."""
+    grid = unit_grid(rows, cols, 192, 192)
+    views = opaque_views([(np.ones((64, 64, 3)), 64, 64, 4)], grid)
+    depth = estimate_depth(photons_of(views, grid, 5000, seed=1), (1 / 6, 1 / 2))
+    error_px = np.abs(8 / depth.z_mm[68:124, 68:124] - 8 * 4)
+    assert np.isfinite(error_px).all()
+    assert (error_px <= 3).mean() > 0.6  # .84 and .73
+    shading = 1 + 0.5 * np.sin(np.arange(192) / 30)
+    light = shading[:, None] * shading * np.ones(grid.shape_KLHW)
+    film = PhotonCounts.from_dense(np.random.default_rng(1).poisson(light), grid, cfa="GRBG")
+    assert np.isnan(estimate_depth(film, (1 / 6, 1 / 2)).z_mm).all()
 
 
 def test_one_view_is_refused():
