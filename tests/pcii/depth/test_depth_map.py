@@ -199,14 +199,14 @@ def test_a_range_that_is_not_near_to_far_is_refused(bad):
 
 
 @pytest.mark.parametrize(("rows", "cols"), [(1, 9), (9, 1)])
-def test_a_line_of_cameras_has_depths_of_plain_things_and_none_of_shaded_light(rows: int, cols: int) -> None:
+def test_a_line_of_cameras_has_depths_of_shaded_things_and_none_of_shaded_light(rows: int, cols: int) -> None:
     """Edges along the line are as sharp out of focus, and so is shading."""
     grid = unit_grid(rows, cols, 192, 192)
-    views = opaque_views([(np.ones((64, 64, 3)), 64, 64, 4)], grid)
-    depth = estimate_depth(photons_of(views, grid, 5000, seed=1), (1 / 6, 1 / 2))
-    error_px = np.abs(8 / depth.z_mm[68:124, 68:124] - 8 * 4)
-    assert np.isfinite(error_px).all()
-    assert (error_px <= 3).mean() > 0.6  # .84 and .73
+    y, x = np.mgrid[-1:1:64j, -1:1:64j]
+    disc = (1 - x**2 - y**2).clip(min=0)[..., None] * np.ones(3)
+    counts = photons_of(opaque_views([(disc, 64, 64, 4)], grid), grid, 20000, seed=1)
+    error_px = np.abs(8 / estimate_depth(counts, (1 / 6, 1 / 2)).z_mm[74:118, 74:118] - 8 * 4)
+    assert (error_px <= 3).mean() > 0.7  # .99 and .85; none where regions are compared by blur
     shading = 1 + 0.5 * np.sin(np.arange(192) / 30)
     light = shading[:, None] * shading * np.ones(grid.shape_KLHW)
     film = PhotonCounts.from_dense(np.random.default_rng(1).poisson(light), grid, cfa="GRBG")
