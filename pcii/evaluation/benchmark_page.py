@@ -41,8 +41,8 @@ COMPARISONS = (
     Comparison(
         "Removal of defocused points",
         "iou",
-        "IoU with the objects of each plane, mean over planes that hold objects: more is better. What leans "
-        "through the depths belongs to no plane",
+        "IoU (pixels both claimed and true / pixels claimed or true) with the objects of each plane, mean "
+        "over planes that hold objects: more is better. What leans through the depths belongs to no plane",
     ),
     Comparison(
         "Removal by pixel",
@@ -52,28 +52,30 @@ COMPARISONS = (
     Comparison(
         "Claimed falsely",
         "false_share",
-        "Share of the film that is claimed at a plane to whose objects it does not belong: less is better, "
+        "Pixels claimed at a plane that show none of its objects / all pixels of the film: less is better, "
         "and 0 is who claims nothing",
     ),
     Comparison(
         "Depth within 1 px",
         "within_1px",
-        "Share of the objects' pixels whose depth is within 1 px of total disparity, no answer being a wrong "
-        "one: more is better",
+        "Share of the objects' pixels whose depth is within 1 px of total disparity, that between the "
+        "outermost cameras, no answer being a wrong one: more is better",
     ),
     Comparison("Depth within 3 px", "within_3px", "The same within 3 px: more is better"),
     Comparison(
         "Confidence",
         "quadratic_score",
-        "Share within 1 px minus the Brier score of confidence, over the objects' pixels: more is better, 0 "
-        "is who never answers, 1 who is always right and sure",
+        "Quadratic score: share within 1 px minus the Brier score, the mean square of confidence minus 1 "
+        "where right and minus 0 where wrong: more is better. 0 is who never answers, 1 who is always right "
+        "and sure, below 0 who is sure and wrong",
     ),
     Comparison(
         "Error of depth",
         "median_px",
-        "Median error of the objects' pixels, geometric mean over scenes of which most pixels have an "
-        "answer: less is better. The Cramér-Rao bound is the least standard deviation of the depth of an "
-        "object as a whole, given its photons and its texture; median over the objects of a scene",
+        "Median error of the objects' pixels in px of total disparity, geometric mean over scenes of which "
+        "most pixels have an answer: less is better. The Cramér-Rao bound is the least standard deviation of "
+        "the depth of an object as a whole, given its photons and its texture; median over the objects of a "
+        "scene",
         "bound_px",
         "bound for whole objects (Cramér-Rao)",
     ),
@@ -179,7 +181,8 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
 
     has_measure = of(comparison.measure)[["scene", "light", "method"]]
     values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)
-    methods = sorted(has_measure["method"].unique())
+    # Those who look at no photon last.
+    methods = sorted(has_measure["method"].unique(), key=lambda name: (name.startswith("("), name))
     bounds = of(comparison.bound_measure).merge(has_measure).drop_duplicates(["scene", "light"], keep="last")
     if len(bounds):
         photons = of("photons_per_view").merge(bounds[["scene", "light", "method"]])

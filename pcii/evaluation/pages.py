@@ -32,9 +32,10 @@ AXES = {
 }
 """Measures of accuracy that are drawn, with the labels of their axes."""
 ABOUT_YARDSTICKS = (
-    "Rows in parentheses look at no photon: who claims and answers nothing, who claims everything at every "
-    "plane, and who answers the one depth that is right for most pixels, which only the truth tells. Sweeps "
-    f"are the simplest methods of depth. {NOT_BETTER}: no better than the best of these there."
+    "Three look at no photon: (nothing) claims nothing and answers nowhere, (everything) claims the whole "
+    "film at every plane, and (one depth) answers the depth that is right for most pixels, which only the "
+    "truth tells. Sweeps are the simplest methods of depth. "
+    f"{NOT_BETTER}: no better than the best of all these for the same scene and light."
 )
 NOTES = (
     "IoU compares masks with the objects that belong to each plane, and is a mean over planes that hold any. "
