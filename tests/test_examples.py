@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib as mpl
 import nbformat
 import pytest
+from guide_blocks import blocks
 from make_notebooks import MOST_NOTEBOOK_BYTES, MOST_PICTURE_BYTES, NOTEBOOKS, run
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,6 +28,18 @@ def test_an_example_runs(
     with mpl.rc_context({"backend": "agg"}):
         runpy.run_path(str(example), run_name="__main__")
     assert len(capsys.readouterr().out.splitlines()) >= 2
+
+
+def test_the_first_lines_of_the_readme_print_what_stands_below_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code, text = (
+        next(block.text for block in blocks(ROOT / "README.md") if block.language == language)
+        for language in ("python", "text")
+    )
+    exec(code, {})
+    printed, found = (NUMBER.findall(each) for each in (capsys.readouterr().out, text))
+    assert [float(number) for number in found] == pytest.approx([*map(float, printed)], rel=0.02, abs=0.03)
 
 
 def shown(cell: Any) -> tuple[list[Any], list[str], list[float]]:
