@@ -134,8 +134,11 @@ def probe_scene(target: Prepared) -> Facts:
     recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
     counting_plan = target.plan(render_scene) if recipe.products.counts else None
-    coarse = coarser(grid, SIDE_PX if is_compiled else SCALAR_SIDE_PX)
-    image, path_s = _picture(render_scene, coarse, recipe.cfa, recipe.seed)
+    side_px = SIDE_PX if is_compiled else SCALAR_SIDE_PX
+    coarse = coarser(grid, side_px)
+    # As many paths on a small film, or the start of a rendering would be taken for the time of its paths.
+    samples = max(SAMPLES, round(SAMPLES * side_px**2 / (coarse.height * coarse.width)))
+    image, path_s = _picture(render_scene, coarse, recipe.cfa, recipe.seed, samples)
     centre = first_hits_at_centre(render_scene, coarse)
     start_s = time.perf_counter()
     corner_hits = [first_hits_of_view(render_scene, coarse, k, l) for k, l in corners(grid)]
@@ -183,7 +186,7 @@ def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
 
 
 def _picture(
-    render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int
+    render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int, samples: int
 ) -> tuple[np.ndarray, float]:
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
@@ -191,8 +194,8 @@ def _picture(
     for part in range(2):  # the first compiles, the second is timed
         path_seed = seeds.integer(seed, stage="check probe", part=part)
         start_s = time.perf_counter()
-        image = image + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
-        path_s = (time.perf_counter() - start_s) / (SAMPLES * grid.height * grid.width)
+        image = image + render_view(render_scene, single, 0, 0, samples_per_pixel=samples, seed=path_seed) / 2
+        path_s = (time.perf_counter() - start_s) / (samples * grid.height * grid.width)
     return (image if cfa is not None else sense(image, None)[..., None]), path_s
 
 
