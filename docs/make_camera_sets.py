@@ -30,15 +30,15 @@ FAR_MM, NEAR_MM = 620.0, 540.0
 TEXT = """# Which camera sets can know what
 
 You have an array of cameras, or plan one. Do depth and removal work with it, in your light? What must the
-baseline be? In short, with {usual_px} px between the things that are to be told apart unless something else
-is said:
+baseline be? The table has the answers. Where it names no other distance, things are {usual_px} px of total
+disparity apart:
 
 {known}
 
 **The baseline** is counted in px of total disparity, (N − 1) focal pitch / (z pixel), between the nearest
-and the farthest of what is to be told apart ([scores](scores.md#units)). Some 5 px are a good plan, with
-few cameras too, up to 10 px with 3 × 3 cameras or more that see texture. A longer one makes a px fewer mm,
-and more pixels wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer
+and the farthest thing that you want to distinguish ([scores](scores.md#units)). Plan 5 px with few cameras,
+and up to 10 px with 3 × 3 cameras or more that see texture. With a longer baseline a px is fewer mm, and more
+pixels are wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer
 cameras, the shorter it must be: what decides is the disparity between neighbours.
 
 ## How it was measured
@@ -436,7 +436,7 @@ def page(rows: Mapping[Key, Row]) -> str:
                         "2 × 2 or 1 × 2 cameras, the same things",
                         "the same coarse depth ("
                         + span("two objects", ("2 × 2", "1 × 2"), "within_3px", two)
-                        + " within 3 px); stay at 5 px or less between what is to be told apart",
+                        + " within 3 px); with things at most 5 px apart it is better",
                         "yes, as their outlines alone tell them apart: "
                         + span("two objects", ("2 × 2", "1 × 2"), "likelihood", two),
                     ),

@@ -18,7 +18,7 @@ from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
-from pcii.evaluation.summary import lines_of
+from pcii.evaluation.summary import lines_of, means
 from pcii.evaluation.tables import SWEEPS
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def measure(
         folders = [work.folder for work in works]
         scores = Path(folder) / "scores"
         evaluation = evaluate(folders, scores, methods=methods, budgets=budgets, report=progress)
-    found = _rows(evaluation.means())
+    found = _rows(means(evaluation.frame))
     return Measured(found, _ratios(found), sorted({work.recipe.seed for work in works}))
 
 

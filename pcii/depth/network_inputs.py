@@ -59,11 +59,10 @@ def inputs_of(
     part: tuple[slice, slice],
     hint: np.ndarray,
 ) -> NetworkInputs:
-    """Inputs of a part of the film, from the evidence of all of it, in whose blocks all views have so many
-    samples.
+    """Inputs of a part of the film, made from the evidence of the whole film.
 
-    `part` is rows and columns of blocks, whole cells. Beyond its end the film is mirrored: an empty border
-    would look like the dark around things.
+    All views together have `samples_per_block` samples in a block. `part` is rows and columns of blocks,
+    whole cells. Beyond its end the film is mirrored: an empty border would look like the dark around things.
     """
     from pcii.base.compiled_loops import each_in_threads
 
@@ -75,9 +74,9 @@ def inputs_of(
         )
 
     def part_of(values: np.ndarray, side: int = 1) -> np.ndarray:
-        own = tuple(slice(each.start // side, each.stop // side) for each in part)
-        ends = [(0, max(each.stop - size, 0)) for each, size in zip(own, values.shape, strict=True)]
-        return np.pad(values, ends, mode="symmetric")[own]
+        box = tuple(slice(each.start // side, each.stop // side) for each in part)
+        ends = [(0, max(each.stop - size, 0)) for each, size in zip(box, values.shape, strict=True)]
+        return np.pad(values, ends, mode="symmetric")[box]
 
     def in_whole_cells(values: np.ndarray) -> np.ndarray:
         return np.pad(values, [(0, -size % CELL_SIDE_BLOCKS) for size in values.shape])

@@ -187,7 +187,7 @@ def _halves_agree(
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
     Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
-    `where` (h, w) bool are is_wanted about; the windows around no others are summed.
+    `where` (h, w) bool are decided, which saves the sums over the windows around all others.
     """
     every_other = planes.take(slice(None, None, 2))
     i, j = (

@@ -129,7 +129,7 @@ def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
 
 @cache
 def _sessions(threads: int) -> "tuple[InferenceSession, InferenceSession]":
-    """The network up to cells of 4 px, on so many threads, and its last step, on one of each caller."""
+    """The network up to cells of 4 px, on a number of threads, and its last step, on the caller's thread."""
     import onnxruntime
 
     def session(name: str, threads: int) -> "InferenceSession":

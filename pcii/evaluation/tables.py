@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base.plain_text import in_markdown
+from pcii.depth.methods import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.summary import MORE_IS_BETTER, NOTHING, YARDSTICKS, lines_of, ranks
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 TITLES = {"iou": "IoU", "within_1px": "Share of depths within 1 px"}
 """What methods of removal and of depth are compared by, more being better."""
-SWEEPS = ("sweep-9", "sweep-17", "sweep-33", "variance-sweep")
+SWEEPS = tuple(name for name in FOR_COUNTS if "sweep" in name)
 SIMPLE = (NOTHING, *YARDSTICKS.values(), *map(depth_name, SWEEPS))
 """What any method should beat."""
 NOT_BETTER = "†"

@@ -19,12 +19,12 @@ def gaussian_mean(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     result, dark = np.zeros((h, w), np.float32), np.zeros(w, np.float32)
     line = np.zeros(w + 2 * reach, np.float32)
     for i in range(h):
-        own = line[reach : reach + w]
-        own[:] = 0
+        middle = line[reach : reach + w]
+        middle[:] = 0
         for r in range(reach + 1):
             above = values[i - r] if i >= r else dark
             below = values[i + r] if 0 < r < h - i else dark
-            _add_pair(own, above, below, weight[r])
+            _add_pair(middle, above, below, weight[r])
         for r in range(reach + 1):
             right = line[reach + r : reach + r + w] if r > 0 else dark
             _add_pair(result[i], line[reach - r : reach - r + w], right, weight[r])

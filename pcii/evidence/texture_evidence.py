@@ -101,9 +101,9 @@ def evidence_of_texture(
     nats, sums, samples = (np.empty((len(planes), h, w), np.float32) for _ in range(3))
 
     def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
-        own = planes.take([plane])
-        blocks = _block_sums(data, own, block_px, scale)
-        number = colours * _samples_of_blocks(own, 0, block_px), _samples_of_blocks(own, 1, block_px)
+        single = planes.take([plane])
+        blocks = _block_sums(data, single, block_px, scale)
+        number = colours * _samples_of_blocks(single, 0, block_px), _samples_of_blocks(single, 1, block_px)
         sums[plane] = blocks[0][:h, :w]
         np.outer(number[0][:h], number[1][:w], out=samples[plane])
         of_cells, spread = (block_sums(part, CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1]))
