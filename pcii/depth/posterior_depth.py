@@ -6,7 +6,7 @@ same structure in a part of it (`pcii.evidence.half_agreement`).
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,17 @@ from pcii.types.photon_counts import PhotonCounts
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
+PLANES_PER_BLOCK = 2
+"""Planes in which the total disparity grows by a block, as in what the network was trained on."""
 NO_DEPTHS = np.zeros(0)
+
+
+class FilmOutputs(NamedTuple):
+    """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
+    requested planes (R, h, w). And the photons of `TextureEvidence` (Z, h / 4, w / 4)."""
+
+    maps: tuple[np.ndarray, np.ndarray, np.ndarray]
+    photons: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -37,8 +47,12 @@ class PosteriorDepth:
     model: TextureModel = field(default_factory=TextureModel)
     prior: SurfacePrior = field(default_factory=SurfacePrior)
     step_px: float = 1.0
-    """Total disparity between planes."""
+    """Total disparity between planes of the posterior."""
     block_px: int = 2
+    trained_blocks: int = 256
+    """Blocks along the longer side of the films that the network was trained on. Of a film with more it is
+    given blocks that are as many times larger, by whole octaves, and the means of their probabilities and of
+    those of blocks half as large are taken. If larger, films of 1024 px are seen in blocks of 2 px alone."""
     window_px: float = 8.0
     """Standard deviation of the window in which there are to be photons."""
     least_photons: float = 10.0
@@ -73,26 +87,54 @@ class PosteriorDepth:
         if isinstance(data, PhotonCounts):
             data = without_hot_pixels(data)
         planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
-        block_px = self.block_px
-        while len(planes) * data.grid.height * data.grid.width / block_px**2 > MOST_VALUES:
-            block_px *= 2
-        evidence = evidence_of_texture(data, planes, block_px, self.model)
-        requested_px = total_disparity_px(data.grid, z_mm)
+        coarse_px, block_px = self._blocks_px(planes)
+        network = self._film_outputs(data, planes, block_px, z_mm)
+        if coarse_px > block_px:
+            coarse = self._film_outputs(data, planes, coarse_px, z_mm)
+            for mean, other in zip(network.maps, coarse.maps, strict=True):
+                for own, part in zip(mean, other, strict=True):
+                    own += on_pixels(part, coarse_px // block_px, own.shape)
+                mean /= 2
+        probability, nothing, in_focus = network.maps
+        maps = probability, nothing[0], block_px, in_focus
+        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing[0].shape, bool))
+        return replace(posterior, is_detected=self._detected(data, posterior, network.photons))
+
+    def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
+        """Sides of the coarse and the fine blocks in which the network sees the film; small ones alike."""
+        height, width = planes.grid.shape_HW
+        fine_px = self.block_px
+        while len(planes) * height * width / fine_px**2 > MOST_VALUES:
+            fine_px *= 2
+        octaves = round(np.log2(max(height, width) / (self.block_px * self.trained_blocks)))
+        coarse_px = max(fine_px, self.block_px * 2 ** max(octaves, 0))
+        return coarse_px, max(fine_px, coarse_px // 2)
+
+    def _film_outputs(
+        self, data: PhotonCounts | Views, planes: FocalPlanes, block_px: int, z_mm: np.ndarray
+    ) -> FilmOutputs:
+        """What the network says of the planes, seeing the film in blocks of one size."""
+        grid, step_px = data.grid, block_px / PLANES_PER_BLOCK
+        own_planes = planes
+        if step_px > self.step_px:
+            own_planes = FocalPlanes.between(grid, planes.z_mm.min(), planes.z_mm.max(), step_px)
+        evidence = evidence_of_texture(data, own_planes, block_px, self.model)
+        h, w = evidence.nats.shape[1:]
         # Where there are no photons there is no surface, and the depth map has no answer.
-        probability, nothing = np.zeros_like(evidence.nats), np.ones_like(evidence.nats[0])
-        in_focus = np.zeros((z_mm.size, *nothing.shape), np.float32)
+        probability = np.zeros((len(planes), h, w), np.float32)
+        nothing, in_focus = np.ones((1, h, w), np.float32), np.zeros((z_mm.size, h, w), np.float32)
         part = self._part_with_photons(evidence.photons, block_px)
         if part is not None:
-            requested_planes = np.interp(requested_px, planes.total_disparity_px, np.arange(len(planes)))
-            inputs = self.network_inputs(evidence, planes, block_px, requested_px, part)
-            for film, own in zip(
-                (probability, nothing, in_focus), run_network(inputs, requested_planes), strict=True
-            ):
-                target = film[..., *part]
-                target[...] = own[..., : target.shape[-2], : target.shape[-1]]
-        maps = probability, nothing, block_px, in_focus
-        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing.shape, bool))
-        return replace(posterior, is_detected=self._detected(data, posterior, evidence.photons))
+            numbers, total_px = np.arange(len(own_planes)), own_planes.total_disparity_px
+            requested_planes = np.interp(total_disparity_px(grid, z_mm), total_px, numbers)
+            inputs = self.network_inputs(evidence, own_planes, block_px, requested_planes, part)
+            outputs = run_network(inputs, requested_planes)
+            h, w = nothing[0][part].shape
+            probability[:, *part] = _at_planes(outputs.probability[:, :h, :w], len(planes))
+            nothing[:, *part] = outputs.no_surface[:h, :w]
+            in_focus[:, *part] = outputs.in_focus[:, :h, :w]
+        nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
+        return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest])
 
     def _detected(
         self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
@@ -122,16 +164,16 @@ class PosteriorDepth:
         evidence: TextureEvidence,
         planes: FocalPlanes,
         block_px: int,
-        requested_px: np.ndarray,
+        requested_planes: np.ndarray,
         part: tuple[slice, slice] | None = None,
     ) -> NetworkInputs:
         """What the network is given for a part of the film, or for all of it.
 
-        `requested_px` (R,) are the total disparities of planes that are asked about; `part` is rows and
+        `requested_planes` (R,) are the positions of requested planes among the planes; `part` is rows and
         columns of blocks.
         """
         rows, cols = (slice(0, -(-size // MULTIPLE) * MULTIPLE) for size in evidence.nats.shape[1:])
-        hint = hint_of(planes.total_disparity_px, requested_px)
+        hint = hint_of(len(planes), requested_planes)
         samples_per_block = planes.grid.view_count * block_px**2
         return inputs_of(evidence, samples_per_block, self.prior, part or (rows, cols), hint)
 
@@ -172,6 +214,21 @@ def depth_map_of(posterior: DepthPosterior) -> DepthMap:
     depth_mm = np.where(posterior.is_detected, depth_of_total_disparity_mm(grid, total_px), np.nan)
     maps = depth_mm, np.where(posterior.is_detected, confidence, 0.0)
     return DepthMap(*(on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps))
+
+
+def _at_planes(probability: np.ndarray, count: int) -> np.ndarray:
+    """Probabilities of `count` planes (count, h, w) from those of fewer (Z, h, w) between the same ends.
+
+    Planes are evenly apart; the sum stays as it is.
+    """
+    Z = len(probability)
+    if count == Z:
+        return probability
+    places = np.linspace(0, Z - 1, count)
+    weights = np.stack([np.interp(places, np.arange(Z), row) for row in np.eye(Z)], axis=1)
+    own = np.tensordot(weights.astype(np.float32), probability, axes=1)
+    own *= probability.sum(axis=0) / np.maximum(own.sum(axis=0), np.finfo(np.float32).tiny)
+    return own
 
 
 def _agreement_of_film(counts: PhotonCounts, planes: FocalPlanes) -> float:

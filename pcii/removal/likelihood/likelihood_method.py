@@ -24,7 +24,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
-from pcii.depth.surface_network import FOCUS_PX
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import (
     JUMP_NATS,
@@ -61,9 +60,9 @@ SEARCH_STEP_PX = 2.0
 SEARCHED_PX = 30.0
 """Depths are searched this far beyond the planes, in px of total disparity: there is evidence of what is
 defocused, too."""
-NEAR_PX = 4.5
+NEAR_PX, FOCUS_PX = 4.5, 10.0
 """A surface is a plane's if it is within 4.5 px of total disparity; a round object's outline lies behind what
-is seen of it, so that a region may be `FOCUS_PX` away, 5 px of blur, before it counts as defocused."""
+is seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 MISPLACED_PX = 1.0 + SEARCH_STEP_PX / 2
 """Largest distance, in px of total disparity, between a surface and the searched depth at which its evidence
 is largest: 1 px, since the whole-pixel shifts of the cameras at both ends are half a pixel off, and half a

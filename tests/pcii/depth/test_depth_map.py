@@ -250,6 +250,20 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
     assert errors_px(edges).mean() > 3 * errors_px(part).mean()  # the fault: no margin
 
 
+def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes(two_squares) -> None:
+    counts, z_mm = two_squares.counts, np.array([0.2, 0.5])
+    of_sizes = PosteriorDepth(), PosteriorDepth(block_px=4)
+    fine, coarse = (method.posterior(counts, RANGE_MM, z_mm) for method in of_sizes)
+    half_px = max(counts.grid.shape_HW) // 2
+    both = PosteriorDepth(trained_blocks=half_px // 2).posterior(counts, RANGE_MM, z_mm)
+    for name in ("probability", "no_surface", "in_focus"):
+        one, other = (getattr(each, name) for each in (fine, coarse))
+        h, w = one.shape[-2:]
+        mean = (one + other.repeat(2, axis=-2).repeat(2, axis=-1)[..., :h, :w]) / 2
+        np.testing.assert_allclose(getattr(both, name), mean, atol=1e-5)
+    np.testing.assert_allclose(coarse.probability.sum(axis=0), 1 - coarse.no_surface, atol=1e-5)
+
+
 def test_without_photons_the_network_is_not_run(monkeypatch) -> None:
     monkeypatch.setattr("pcii.depth.posterior_depth.run_network", None)
     grid = unit_grid(2, 2, 64, 64)
