@@ -64,27 +64,27 @@ ENTRIES = {
 
 def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_light() -> None:
     errors = {
-        ("a", 30.0, "focus"): 0.25,
+        ("a", 30.0, "posterior"): 0.25,
         ("a", 30.0, "sweep-17"): 0.5,
         ("a", 30.0, "variance-sweep"): 0.75,
-        ("a", 100.0, "focus"): 0.5,
+        ("a", 100.0, "posterior"): 0.5,
         ("a", 100.0, "variance-sweep"): 0.25,
-        ("b", 30.0, "focus"): 0.75,
+        ("b", 30.0, "posterior"): 0.75,
         ("b", 30.0, "sweep-17"): 0.5,
         ("b", 30.0, "variance-sweep"): 0.25,
-        ("c", 30.0, "focus"): 0.5,
-        ("d", 30.0, "focus"): 0.5,  # of no scene of the corpus
-        ("e", 30.0, "focus"): None,  # a scene without objects
+        ("c", 30.0, "posterior"): 0.5,
+        ("d", 30.0, "posterior"): 0.5,  # of no scene of the corpus
+        ("e", 30.0, "posterior"): None,  # a scene without objects
     }
     text = "\n".join(depth.report(evaluation_of(errors), ENTRIES))
     assert "10 datasets" in text
     for row in (
-        "| test | textured | stones | depth:focus | 1 | 0.500 | – |",
-        "| train | cluttered | slats | depth:focus | 1 | 0.750 (3.00) | – |",
+        "| test | textured | stones | depth:posterior | 1 | 0.500 | – |",
+        "| train | cluttered | slats | depth:posterior | 1 | 0.750 (3.00) | – |",
         "| train | cluttered | slats | depth:variance-sweep | 1 | 0.250 (1.00) | – |",
-        "| train | textured | balls | depth:focus | 1 | 0.250 (0.50) | 0.500 (2.00) |",
+        "| train | textured | balls | depth:posterior | 1 | 0.250 (0.50) | 0.500 (2.00) |",
         "| train | textured | balls | depth:variance-sweep | 1 | 0.750 (1.50) | 0.250 (1.00) |",
         # (0.25 + 0.75) / 2, and of the better sweeps (0.5 + 0.25) / 2.
-        "| train | all | depth:focus | 2 | 0.500 (1.33) | 0.500 (2.00) |",
+        "| train | all | depth:posterior | 2 | 0.500 (1.33) | 0.500 (2.00) |",
     ):
         assert row in text, row

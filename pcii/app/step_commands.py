@@ -125,12 +125,12 @@ def depth(
 
     Example of use:
 
-        pcii depth out/paper --method focus --z-range-mm 450 750 -o out/paper-depth
+        pcii depth out/paper --method sweep-17 --z-range-mm 450 750 -o out/paper-depth
 
     Parameters
     ----------
     method
-        posterior or variance-sweep; of counts also focus, sweep-9, sweep-17 or sweep-33, of radiance also
+        posterior or variance-sweep; of counts also sweep-9, sweep-17 or sweep-33, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
     data = dataset_at(dataset, budget)

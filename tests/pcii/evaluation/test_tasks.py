@@ -36,7 +36,6 @@ IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
 OF_COUNTS = [
     "depth:posterior",
-    "depth:focus",
     *(f"depth:sweep-{width}" for width in (9, 17, 33)),
     "depth:variance-sweep",
 ]
