@@ -93,7 +93,7 @@ class PosteriorDepth:
             coarse = self._film_outputs(data, planes, coarse_px, z_mm)
             for mean, other in zip(network.maps, coarse.maps, strict=True):
                 for own, part in zip(mean, other, strict=True):
-                    own += on_pixels(part, coarse_px // block_px, own.shape)
+                    own += _between_blocks(part, own.shape)
                 mean /= 2
         probability, nothing, in_focus = network.maps
         maps = probability, nothing[0], block_px, in_focus
@@ -229,6 +229,16 @@ def _at_planes(probability: np.ndarray, count: int) -> np.ndarray:
     own = np.tensordot(weights.astype(np.float32), probability, axes=1)
     own *= probability.sum(axis=0) / np.maximum(own.sum(axis=0), np.finfo(np.float32).tiny)
     return own
+
+
+def _between_blocks(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Values (h, w) of blocks half as large, interpolated linearly."""
+    from scipy.ndimage import convolve1d
+
+    fine = on_pixels(coarse, 2, shape)
+    for axis in (0, 1):
+        fine = convolve1d(fine, np.array([0.25, 0.5, 0.25]), axis, mode="nearest")
+    return fine
 
 
 def _agreement_of_film(counts: PhotonCounts, planes: FocalPlanes) -> float:
