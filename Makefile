@@ -59,7 +59,7 @@ test: llvm $(VENV)/.ready-dev
 	@folder=$$(mktemp -d); trap 'rm -rf $$folder' EXIT; \
 	$(BIN)/pyright >$$folder/types 2>&1 & types=$$!; \
 	$(BIN)/pcii sample --out $$folder/data && \
-	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method likelihood && \
+	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method posterior && \
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow and not stress and not guide"; tests=$$?; \
 	wait $$types || { cat $$folder/types; exit 1; }; exit $$tests
 

@@ -254,7 +254,7 @@ def measure(scene: str, cameras: str, difference_px: float, photons: int) -> Row
         methods.append("likelihood")
     focus = [pcii.segment(counts, z_mm, method=method) for method in methods]
     focus.append(masks_of(posterior, focus[0].sections))
-    score = pcii.score(focus, depth_map_of(posterior), truth)
+    score = pcii.score(focus, depth_map_of(posterior, view.z_range_mm), truth)
     depth, true_px = score.depth, total_disparity_px(counts.grid, truth.object_z_mm)
     # What the answers would be without the rules by which the method abstains.
     _, _, total_px = posterior.most_probable()

@@ -155,9 +155,9 @@ def reading(measured: Measured) -> str:
         f" posterior has {of(DEPTH, DEFAULT, few, 'within_1px_percent'):.0f} % of the"
         f" objects' pixels within 1 px of their depth with {few:g} photons per view and"
         f" {of(DEPTH, DEFAULT, many, 'within_1px_percent'):.0f} % with {many:g}; dashed bounds are standard"
-        " deviations of whoever knows an object's texture and that all of it lies at one depth. IoU by"
-        f" likelihood goes from {of(REMOVAL, 'likelihood', few, 'iou'):.2f} to"
-        f" {of(REMOVAL, 'likelihood', many, 'iou'):.2f}, by the paper's three steps from"
+        " deviations of whoever knows an object's texture and that all of it lies at one depth. IoU by the"
+        f" network goes from {of(REMOVAL, 'posterior', few, 'iou'):.2f} to"
+        f" {of(REMOVAL, 'posterior', many, 'iou'):.2f}, by the paper's three steps from"
         f" {of(REMOVAL, 'three-step', few, 'iou'):.2f} to {of(REMOVAL, 'three-step', many, 'iou'):.2f}."
     )
 

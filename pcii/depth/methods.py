@@ -76,7 +76,7 @@ def estimate_depth(
     z_range_mm = _checked_range_mm(data, z_range_mm)
     estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
     if isinstance(estimate, PosteriorDepth):
-        return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm))
+        return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm), z_range_mm)
     warn_of_saturation(data)
     return estimate(data, z_range_mm)
 
@@ -84,11 +84,12 @@ def estimate_depth(
 def depth_posterior(
     data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, z_mm: object = None
 ) -> DepthPosterior:
-    """Probability of each depth in `z_range_mm`, and of no surface there, for blocks of 2 x 2 pixels or more.
+    """Probability of each depth in `z_range_mm`, and of no surface there, for square blocks of pixels.
 
     It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
     value everywhere: where no photon is, that of scenes on average. Of the depths `z_mm` (Z,), if any are
-    given, it says what is in focus there, as the method "posterior" of `segment` does. Raises `InputError` as
+    given, it says what is in focus there, as the method "posterior" of `segment` does; depths within 20 px of
+    total disparity around them are part of it. Raises `InputError` as
     `estimate_depth`.
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)

@@ -110,7 +110,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
     ("has", "methods", "budgets", "sentence"),
     [
         ("counts", ["depth:structure-tensor"], [], "'depth:structure-tensor' needs radiance, and of .*; use"),
-        ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
+        ("views", ["posterior"], [], "'posterior' needs photon counts, and of .*alone radiance would"),
         ("counts", [], [FULL_LIGHT], "has no budget full-light; there are exposure"),
     ],
 )
