@@ -94,6 +94,7 @@ class PosteriorDepth:
         these."""
         if isinstance(data, PhotonCounts):
             data = without_hot_pixels(data)
+        z_mm, order = np.unique(z_mm, return_inverse=True)
         planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
         coarse_px, block_px = self._blocks_px(planes)
         network = self._film_outputs(data, planes, block_px, z_mm)
@@ -104,7 +105,7 @@ class PosteriorDepth:
                     own += _between_blocks(part, own.shape)
                 mean /= 2
         probability, nothing, in_focus = network.maps
-        maps = probability, nothing[0], block_px, in_focus
+        maps = probability, nothing[0], block_px, in_focus[order]
         posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing[0].shape, bool))
         return replace(posterior, is_detected=self._detected(data, posterior, network.photons))
 

@@ -26,9 +26,10 @@ def remove_by_network(
 
 def masks_of(posterior: DepthPosterior, sections: Sections) -> Segmented:
     """In-focus masks of the sections, at whose planes the posterior was requested."""
-    none = 1 - posterior.in_focus.sum(axis=0)
-    label = np.concatenate([posterior.in_focus, none[None]]).argmax(axis=0)
-    is_own = label == np.arange(len(posterior.in_focus))[:, None, None]
+    # A plane that is requested twice counts once.
+    _, of_planes = np.unique(sections.planes.z_mm, return_index=True)
+    of_none = 1 - posterior.in_focus[of_planes].sum(axis=0)
+    is_own = posterior.in_focus >= np.maximum(posterior.in_focus.max(axis=0), of_none)
     masks, probability = (
         on_pixels(blocks, posterior.block_px, posterior.planes.grid.shape_HW)
         for blocks in (is_own & posterior.is_detected, posterior.in_focus)

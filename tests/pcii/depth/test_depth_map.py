@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -152,8 +153,8 @@ def test_the_depth_of_a_slanted_card_is_monotone(turned):
     found = np.array([np.nanmedian(6 / z[:, x - 8 : x + 8]) for x in middle])
     true = 6 * (3.0 + 3.0 * middle / 159)
     assert np.all(np.diff(found) > 0)
-    # Bands of 16 px span 1.8 px of total disparity, planes 2: half of that.
-    np.testing.assert_allclose(found, true, atol=1.0)
+    # Bands of 16 px span 1.8 px of total disparity, planes 1: half of each.
+    np.testing.assert_allclose(found, true, atol=1.4)
     assert np.isfinite(z[:, 16:-16]).mean() > 0.9
 
 
@@ -252,10 +253,13 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
 
 def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes(two_squares) -> None:
     counts, z_mm = two_squares.counts, np.array([0.2, 0.5])
-    of_sizes = PosteriorDepth(), PosteriorDepth(block_px=4)
-    fine, coarse = (method.posterior(counts, RANGE_MM, z_mm) for method in of_sizes)
-    half_px = max(counts.grid.shape_HW) // 2
-    both = PosteriorDepth(trained_blocks=half_px // 2).posterior(counts, RANGE_MM, z_mm)
+    fine, coarse = (
+        replace(method, trained_blocks=max(counts.grid.shape_HW) // method.block_px).posterior(
+            counts, RANGE_MM, z_mm
+        )
+        for method in (PosteriorDepth(), PosteriorDepth(block_px=4))
+    )
+    both = PosteriorDepth(trained_blocks=max(counts.grid.shape_HW) // 4).posterior(counts, RANGE_MM, z_mm)
     for name in ("probability", "no_surface", "in_focus"):
         one, other = (getattr(each, name) for each in (fine, coarse))
         down, right = (
