@@ -1,4 +1,3 @@
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -253,13 +252,12 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
 
 def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes(two_squares) -> None:
     counts, z_mm = two_squares.counts, np.array([0.2, 0.5])
+    long_px = max(counts.grid.shape_HW)
     fine, coarse = (
-        replace(method, trained_blocks=max(counts.grid.shape_HW) // method.block_px).posterior(
-            counts, RANGE_MM, z_mm
-        )
-        for method in (PosteriorDepth(), PosteriorDepth(block_px=4))
+        PosteriorDepth(block_px=side, trained_blocks=long_px // side).posterior(counts, RANGE_MM, z_mm)
+        for side in (2, 4)
     )
-    both = PosteriorDepth(trained_blocks=max(counts.grid.shape_HW) // 4).posterior(counts, RANGE_MM, z_mm)
+    both = PosteriorDepth(trained_blocks=long_px // 4).posterior(counts, RANGE_MM, z_mm)
     for name in ("probability", "no_surface", "in_focus"):
         one, other = (getattr(each, name) for each in (fine, coarse))
         down, right = (
