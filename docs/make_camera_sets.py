@@ -38,8 +38,9 @@ disparity apart:
 **The baseline** is counted in px of total disparity, (N − 1) focal pitch / (z pixel), between the nearest
 and the farthest thing that you want to distinguish ([scores](scores.md#units)). Plan 5 px with few cameras,
 and up to 10 px with 3 × 3 cameras or more that see texture. With a longer baseline a px is fewer mm, and more
-pixels are wrong: at 20 px no set below is better within 1 px than one depth everywhere. The fewer
-cameras, the shorter it must be: what decides is the disparity between neighbours.
+pixels are wrong: at 20 px only 10 × 10 cameras before a bright room are better within 1 px than one depth
+everywhere, and of the two objects the nearer one is lost. The fewer cameras, the shorter it must be: what
+decides is the disparity between neighbours.
 
 ## How it was measured
 
