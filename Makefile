@@ -2,9 +2,8 @@
 # make test   style, types and tests
 # make check-docs   what the guides, the notebooks and the examples show, by running them
 # make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 20 minutes
-# make bench  run time against error, in minutes: tables, figures and a page in out/bench; TABLES="sections"
-#             for one study, TABLES=removal BENCH_SEEDS=3 to compare methods over scenes and seeds, TABLES=depth
-#             those of depth
+# make bench  run time against error, in minutes: tables, figures and a page in out/bench; TABLES="sections skips"
+#             for these studies alone
 # make bench-full     the same at full size: hours
 # make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
 # make bench-publish  make bench, then docs/benchmarks.md, the committed ratios and the figures that pages quote from
@@ -60,7 +59,7 @@ test: llvm $(VENV)/.ready-dev
 	@folder=$$(mktemp -d); trap 'rm -rf $$folder' EXIT; \
 	$(BIN)/pyright >$$folder/types 2>&1 & types=$$!; \
 	$(BIN)/pcii sample --out $$folder/data && \
-	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method likelihood && \
+	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method posterior && \
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow and not stress and not guide"; tests=$$?; \
 	wait $$types || { cat $$folder/types; exit 1; }; exit $$tests
 

@@ -3,6 +3,5 @@
 Every study of `studies` gives rows and ratios (`results`, `timing`, `machine`), a figure (`figures`) and a
 part of the page (`page`); `guard` compares ratios. Pages quote figures of these studies, of methods on the
 paper's scene (`paper_scene`) and of the public benchmark (`quoted`). `peers` holds what ours is compared
-with. The tables of removal and depth over the corpus of scenes (`corpus`, `drawn`) take days and are printed
-alone.
+with. `depth_constants` is a command of its own, which prints what the constants of depth change.
 """

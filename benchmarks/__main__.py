@@ -3,11 +3,10 @@
 import argparse
 import sys
 import time
-from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from benchmarks import depth, depth_constants, paper_scene, removal
+from benchmarks import paper_scene
 from benchmarks.figures import draw
 from benchmarks.guard import losses, read_reference, write_reference
 from benchmarks.machine import commit, in_words, machine, versions, was_busy
@@ -18,20 +17,14 @@ from benchmarks.studies import STUDIES
 from pcii.base.errors import InputError
 from pcii.evaluation.tables import markdown
 
-LONG_TABLES = {
-    "removal": removal.table,
-    "depth": depth.table,
-    "depth-constants": depth_constants.table,
-}
-"""Tables over the corpus of scenes, which take days (corpus.py says how to make them smaller)."""
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 
 
 def main() -> int:
     """Run the command line; gives the exit code: 1 for a lost ratio, 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    names = (*(study.name for study in STUDIES), *LONG_TABLES)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(names)}; guard; publish")
+    studies = {study.name: study for study in STUDIES}
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(studies)}; guard; publish")
     parser.add_argument("--full", action="store_true", help="full size: hours instead of minutes")
     parser.add_argument("--out", type=Path, default=Path("out/bench"), help="folder of results (%(default)s)")
     given = parser.parse_args()
@@ -41,28 +34,16 @@ def main() -> int:
         if given.names == ["publish"]:
             return publish(given.out)
         for name in given.names:
-            if name not in names:
-                raise InputError(f"NAME: there is no study named {name!r}; use {', '.join(names)}")
-        run(given.names or [study.name for study in STUDIES], "full" if given.full else "quick", given.out)
+            if name not in studies:
+                raise InputError(f"NAME: there is no study named {name!r}; use {', '.join(studies)}")
+        for name in given.names or studies:
+            measure(studies[name], "full" if given.full else "quick", given.out)
+        write_html(given.out / "benchmarks.html", STUDIES, records_in(given.out))
+        print(f"The page is {given.out / 'benchmarks.html'}.")
     except InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2
     return 0
-
-
-def run(names: Iterable[str], size: Size, out: Path) -> None:
-    """Measure the studies of these names and make the page anew; print the tables of long ones."""
-    studies = {study.name: study for study in STUDIES}
-    for name in names:
-        if name in LONG_TABLES:
-            for line in LONG_TABLES[name]():
-                print(line, flush=True)
-            print()
-        else:
-            measure(studies[name], size, out)
-    if any(name in studies for name in names):
-        write_html(out / "benchmarks.html", STUDIES, records_in(out))
-        print(f"The page is {out / 'benchmarks.html'}.")
 
 
 def measure(study: Study, size: Size, out: Path) -> Record:

@@ -1,76 +1,59 @@
-"""What the constants of depth by the posterior of a surface change, on the scenes that they are chosen by.
+"""What the constants of depth by the posterior change: each alone is halved and doubled, on datasets.
 
-Each constant alone is halved and doubled. The figures are means over the train half of the scenes: the share
-of the objects' pixels whose depth is off by more than 1 px of total disparity, or missing, and the expected
-calibration error of the answers there. The variables of corpus.py say of which scenes, seeds and budgets.
+For each amount of light the table has two means over the datasets: the share of the objects' pixels whose
+depth is off by more than 1 px of total disparity, or missing, of which less is better, and the quadratic
+score of the confidence, of which more is better.
 """
 
+import argparse
+import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from benchmarks.corpus import chosen_works, make
+import pcii
 from pcii.base.progress import Stages
 from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.evaluation.tables import Table, markdown
-from pcii.metrics.depth_accuracy import depth_errors
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.suggested_depths import depth_range_of
-from pcii.types.estimates import DepthMap
-from pcii.types.photon_limit import Light
-
-CHOSEN = PosteriorDepth()
-FACTORS = (0.5, 2.0)
+from pcii.evaluation.method_names import depth_name
+from pcii.evaluation.tables import Table, light_name, markdown
 
 
-def table() -> Iterator[str]:
-    """Make the datasets that are missing, and try every variant on each of them."""
-    works, budgets = chosen_works()
-    works = [work for work in works if work.entry.half == "train"]
-    variants = [("as chosen", CHOSEN), *_variants()]
-    figures = np.full((len(variants), len(works), len(budgets), 2), np.nan)
-    with Stages() as progress:
-        make(works, progress)
-        places = list(np.ndindex(len(works), len(budgets)))
-        for done, place in enumerate(places, start=1):
-            data = open_dataset(works[place[0]].folder).at_light(Light(budgets[place[1]]))
-            for number, (_, method) in enumerate(variants):
-                figures[number, *place] = _errors(data, method)
-            progress("datasets and budgets", done, len(places))
-    rows = [
-        (name, *(f"{bad:.3f}, {ece:.3f}" for bad, ece in np.nanmean(own, axis=0)))
-        for (name, _), own in zip(variants, figures, strict=True)
-    ]
-    shown = Table(
-        f"Constants of depth: errors above 1 px, calibration error; {len(works)} datasets",
-        ("constant", *(f"{budget:g}" for budget in budgets)),
-        tuple(rows),
-        words=1,
-    )
-    yield f"{shown.title}\n\n{markdown(shown)}"
+def main() -> int:
+    """Run the command line; gives the exit code, 2 for bad input."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.depth_constants", description=__doc__)
+    parser.add_argument("folders", nargs="+", metavar="FOLDER", help="a dataset, or a collection of them")
+    parser.add_argument("--budget", action="append", default=[], help="photons, or full-light (default: all)")
+    options, methods = parser.parse_args(), dict(variants())
+    functions = [(depth_name(name), method) for name, method in methods.items()]
+    try:
+        with tempfile.TemporaryDirectory() as folder, Stages() as report:
+            folders, budgets, out = options.folders, options.budget, Path(folder) / "scores"
+            evaluation = pcii.evaluate(folders, out, methods=functions, budgets=budgets, report=report)
+    except pcii.InputError as fault:
+        print(f"error: {fault}", file=sys.stderr)
+        return 2
+    groups: Any = evaluation.frame.groupby(["method", "light"], observed=True)
+    cells = groups[["within_1px", "quadratic_score"]].mean()
+    cells["text"] = [f"{1 - within:.3f}, {score:.3f}" for within, score in cells.to_numpy()]
+    texts = cells["text"].unstack("light")
+    rows = [(name, *texts.loc[depth_name(name)]) for name in methods]
+    print(markdown(Table("", ("constant", *map(light_name, texts.columns)), tuple(rows))))
+    return 0
 
 
-def _variants() -> Iterator[tuple[str, PosteriorDepth]]:
-    """Names and methods in which one number is halved or doubled."""
+def variants() -> Iterator[tuple[str, PosteriorDepth]]:
+    """The method as it is, and with each of its numbers halved and doubled."""
+    default = PosteriorDepth()
+    yield "as it is", default
     for part in ("model", "prior", None):
-        owner: Any = CHOSEN if part is None else getattr(CHOSEN, part)
+        owner: Any = getattr(default, part) if part else default
         for name, value in vars(owner).items():
-            if not isinstance(value, int | float):
-                continue
-            for factor in FACTORS:
-                changed = replace(owner, **{name: type(value)(value * factor)})
-                method = changed if part is None else replace(CHOSEN, **{part: changed})
-                yield f"{name} = {type(value)(value * factor):g}", method
+            for factor in (0.5, 2) if isinstance(value, int | float) else ():
+                changed = replace(owner, **{name: type(value)(factor * value)})
+                yield f"{name} = {factor * value:g}", replace(default, **{part: changed}) if part else changed
 
 
-def _errors(data: Dataset, method: PosteriorDepth) -> tuple[float, float]:
-    """`bad_1px`, and the calibration error of the answers on objects."""
-    assert data.truth is not None
-    depth = method(data.counts, depth_range_of(data))
-    on_object = data.truth.object_id > 0
-    z_mm = np.where(on_object, depth.z_mm, np.nan)
-    only = DepthMap(z_mm, np.where(np.isfinite(z_mm), depth.confidence, 0))
-    errors = depth_errors(data.grid, only, data.truth)
-    return errors["bad_1px"], np.nan if errors["ece"] is None else errors["ece"]
+if __name__ == "__main__":
+    sys.exit(main())

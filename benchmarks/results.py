@@ -25,10 +25,10 @@ UNITS = {
     "bits": "bits", "bytes": "bytes",
 }  # fmt: skip
 SPELLINGS = {
-    "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000", "cpsnr": "CPSNR",
-    "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
+    "1px": "1 px", "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000",
+    "cpsnr": "CPSNR", "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
 }  # fmt: skip
-"""Words that are not written in small letters."""
+"""Words that are written in another way than names of quantities."""
 
 
 @dataclass(frozen=True)

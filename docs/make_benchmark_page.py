@@ -28,22 +28,21 @@ from simgen.dataset.benchmark_making import load_definition
 
 BENCHMARK = "pcii-bench-1"
 DOCS = Path(__file__).parent
-METHOD = "likelihood"
+METHOD = "posterior"
 PAGE = """# Scores of removal, kind by kind
 
 The methods of removal that ship, on the test half of [the benchmark](../benchmark.md). [Its page](../{page})
 has the scores of each scene with their intervals, and depth. Made by `docs/make_benchmark_page.py`;
 times are of {machine}.
 
-[Removal of defocused points](../removal.md) describes the methods; [the likelihood method](likelihood.md) and
-[the three steps](three_step.md) show what limits them.
+[Removal of defocused points](../removal.md) describes the methods; [the three steps](three_step.md) show what limits them.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
 *Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws
 of photons. What leans belongs to no one plane: it counts by pixel and in depth.*
 
-## Where the likelihood method's IoU falls with more photons
+## Where the network's IoU falls with more photons
 
 By more than {fall:g} in the mean over draws; in brackets the 95 % interval, wide where there are three draws:
 
@@ -73,7 +72,7 @@ def results(submissions: Path) -> pd.DataFrame:
 
 
 def falls(table: pd.DataFrame) -> Iterator[str]:
-    """A line for each fall of the likelihood method's IoU to the next larger budget."""
+    """A line for each fall of the network's IoU to the next larger budget."""
     own = table[(table["method"] == METHOD) & (table["measure"] == "iou")]
     for scene, rows in own.groupby("scene", observed=True):
         for before, after in itertools.pairwise(lines_of(rows.sort_values("light"))):

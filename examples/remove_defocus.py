@@ -3,7 +3,7 @@
 import pcii
 
 dataset = pcii.sample()
-for method in ("three-step", "likelihood"):
+for method in ("three-step", "posterior"):
     focus = pcii.segment(dataset.counts, z_mm=[540, 620], method=method)
     for row in pcii.score(focus, None, dataset.truth).planes:
         if row["truth"] == "object":

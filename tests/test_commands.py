@@ -46,7 +46,7 @@ def test_score_json_is_as_in_the_contract(results: Path) -> None:
         assert {*keys.split(), "entropy_before", "entropy_after"} <= set(row)
         assert row["truth"] in ("object", "pixel")
     assert {(row["z_mm"], row["method"]) for row in score["planes"]} == {
-        (z, method) for z in (540.0, 620.0) for method in ("three-step", "likelihood")
+        (z, method) for z in (540.0, 620.0) for method in ("three-step", "posterior")
     }
     assert [row["name"] for row in score["objects"]] == ["ball", "bird"]
     contract = ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
@@ -61,7 +61,7 @@ def test_table_1_holds_and_objects_are_found_on_the_sample(results: Path) -> Non
     assert ball["540"] < ball["620"]
     assert bird["620"] < bird["540"]
     # About 0.1 better than this.
-    least = {"likelihood": 0.85, "three-step": 0.83}
+    least = {"posterior": 0.85, "three-step": 0.83}
     for row in score["planes"]:
         if row["truth"] == "object":
             assert row["iou"] > least[row["method"]], row
@@ -69,7 +69,7 @@ def test_table_1_holds_and_objects_are_found_on_the_sample(results: Path) -> Non
 
 def test_steps_one_by_one_give_the_same_score(results: Path, tmp_path: Path) -> None:
     out, data = str(tmp_path / "steps"), str(SAMPLE)
-    for method in ("three-step", "likelihood"):
+    for method in ("three-step", "posterior"):
         command = ["segment", data, "--z-mm", "540", "--z-mm", "620", "--method", method, "-o", out]
         assert command_line.run(pcii_cli.app, command) == 0
     assert command_line.run(pcii_cli.app, ["depth", data, "-o", out]) == 0

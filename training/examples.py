@@ -92,7 +92,7 @@ class Examples:
             )
             of_id[part["objects"][:, 0].astype(int)] = np.arange(1, len(part["objects"]) + 1)
             targets.append(request.targets[of_id[np.maximum(part["object_id"], 0)]])
-            hints.append(hint_of(np.arange(self.plane_count[files[0]]), request.planes))
+            hints.append(hint_of(self.plane_count[files[0]], request.planes))
         for target, request in zip(targets, requests, strict=True):
             target[target == request.planes.size] = most
         stacked = {name: np.stack([part[name] for part in parts]) for name in NetworkInputs._fields[:-1]}

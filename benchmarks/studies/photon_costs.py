@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.drawn import KINDS, TUNING, write_recipe
 from benchmarks.figures import bars, curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import FIRST_NUMBER, KINDS, film, setup_of
 from benchmarks.timing import median_of, ratio_of, side_by_side, timed
 from pcii.types.camera_grid import CameraGrid
 from simgen.dataset.generation import generate
@@ -134,13 +133,13 @@ def _drawn(each: int, base_ms: float) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for kind in KINDS:
             relative, kept, raised, fresh = [], [], [], []
-            for number in range(TUNING, TUNING + each):
-                recipe, recipe_folder = load_recipe(str(write_recipe(Path(folder), kind, number)))
+            for number in range(FIRST_NUMBER, FIRST_NUMBER + each):
+                recipe = Recipe(scene=f"drawn_{kind}", scene_number=number, seed=number)
                 start = time.perf_counter()
-                generate(recipe, recipe_folder, Path(folder) / f"{kind}_{number}_data")
+                generate(recipe, Path(), Path(folder) / f"{kind}_{number}")
                 fresh.append(time.perf_counter() - start)
                 grid, depth = recipe.grid.camera_grid(), recipe.render.max_depth
-                setup = Setup(prepare(recipe, recipe_folder).render_scene(), grid, recipe.cfa, depth)
+                setup = Setup(prepare(recipe, Path()).render_scene(), grid, recipe.cfa, depth)
                 logs: list[dict[str, Any]] = []
                 works = {
                     kind: lambda n, s=setup, p=recipe.photons, logs=logs: logs.append(

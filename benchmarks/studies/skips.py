@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.drawn import KINDS, TUNING
 from benchmarks.figures import bars
 from benchmarks.results import Measured, Row, Size, Study, Value
+from benchmarks.scenes import FIRST_NUMBER, KINDS
 from benchmarks.skips import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
 from simgen.spec.recipe import Recipe, load_recipe
@@ -100,8 +100,8 @@ def random_world(number: int, side_px: int, folder: Path) -> World:
     rows, cols = (int(n) for n in rng.integers(2, 5, 2))
     recipe = Recipe.model_validate(
         {
-            "scene": f"drawn_{rng.choice(list(KINDS))}",
-            "scene_number": int(TUNING + rng.integers(1000)),
+            "scene": f"drawn_{rng.choice(KINDS)}",
+            "scene_number": int(FIRST_NUMBER + rng.integers(1000)),
             "seed": number,
             "grid": {
                 "rows": rows,

@@ -62,7 +62,7 @@ def evaluate(
     Examples of use:
 
         pcii evaluate out/paper20 -o out/compared
-        pcii evaluate out/paper20 out/slats20 -o out/compared --method depth:focus --budget 300 --workers 2
+        pcii evaluate out/paper20 out/slats20 -o out/compared --method depth:sweep-17 --budget 300 --workers 2
 
     Parameters
     ----------

@@ -99,13 +99,11 @@ def analyse(
 def _depth_of(
     data: PhotonCounts | Views, z_range_mm: tuple[float, float], planes: FocalPlanes, method: str
 ) -> tuple[DepthMap, DepthPosterior | None]:
-    """The depth map, and the posterior that it is read from if masks of the planes can be too."""
-    near_mm, far_mm = z_range_mm
-    has_planes = near_mm <= planes.z_mm.min() and planes.z_mm.max() <= far_mm
-    if method != DEFAULT_METHOD or not has_planes:
+    """The depth map, and the posterior that it is read from, if it is, as masks of the planes can be."""
+    if method != DEFAULT_METHOD:
         return estimate_depth(data, z_range_mm, method=method), None
     posterior = depth_posterior(data, z_range_mm, z_mm=planes)
-    return depth_map_of(posterior), posterior
+    return depth_map_of(posterior, z_range_mm), posterior
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes) -> Sections | None:

@@ -53,12 +53,12 @@ def run(
     Examples of use:
 
         pcii run out/paper -o out/paper-results
-        pcii run out/paper -o out/paper-stack --z-mm 500:700:20 --method likelihood --z-range-mm 450 750
+        pcii run out/paper -o out/paper-stack --z-mm 500:700:20 --method three-step --z-range-mm 450 750
 
     Parameters
     ----------
     method
-        A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
+        A method of removal, as in `pcii segment`; repeat for more. Default: three-step and posterior.
     depth_method
         A method of depth, as in `pcii depth`.
     """
@@ -125,12 +125,12 @@ def depth(
 
     Example of use:
 
-        pcii depth out/paper --method focus --z-range-mm 450 750 -o out/paper-depth
+        pcii depth out/paper --method sweep-17 --z-range-mm 450 750 -o out/paper-depth
 
     Parameters
     ----------
     method
-        posterior or variance-sweep; of counts also focus, sweep-9, sweep-17 or sweep-33, of radiance also
+        posterior or variance-sweep; of counts also sweep-9, sweep-17 or sweep-33, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
     data = dataset_at(dataset, budget)
@@ -151,7 +151,7 @@ def segment(
     *,
     out: ResultsOut,
     z_mm: SectionDepths = (),
-    method: str = "likelihood",
+    method: str = "posterior",
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
@@ -163,14 +163,15 @@ def segment(
     Parameters
     ----------
     method
-        three-step (of the paper), likelihood (Poisson), posterior (of depth), brightness, variance or
+        posterior (by the network of depth), three-step (of the paper), brightness, variance or
         shape-from-focus (for comparison); or one that a package registers, module:function, or
         file.py:function.
     """
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
-        focus = removal.segment(data.counts, planes, method=method)
+        z_range_mm = depth_range_of(data, z_mm)
+        focus = removal.segment(data.counts, planes, z_range_mm=z_range_mm, method=method)
         results.save_segmented(folder, focus)
         for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
             write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))

@@ -4,7 +4,6 @@ chain_kernels    Compiled: posterior probabilities along chains of blocks, by pa
                  backward.
 depth_planes     Planes that a search of depth compares, and the depth between planes where a measure is
                  largest.
-focus_labels     Depth by focus evidence: a plane for each cell, with a cost of changes, and its posterior
                  probability.
 methods          Estimators of depth by name: a depth for each pixel of the virtual centre.
 network_inputs   What the network of depth is given: evidence, the posterior of a surface, brightness,

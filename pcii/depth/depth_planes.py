@@ -30,20 +30,12 @@ def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
     return near, far
 
 
-def neighbours_of(measure: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """A measure (Z, h, w) at the plane before the `best` (h, w), at it, and after it; (3, h, w).
-
-    Beyond the first and the last plane it is minus infinity.
-    """
-    padded = np.pad(measure, ((1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
-    return np.stack([np.take_along_axis(padded, (best + step)[None], axis=0)[0] for step in range(3)])
-
-
 def peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:
     """Depth (h, w) in mm of the top of a parabola through the `best` plane (h, w) and its neighbours.
 
-    `nearby` (3, h, w) is a measure that is larger the better the plane, as of `neighbours_of`; total
-    disparities of the planes are evenly spaced. The depth stays within half a step of the best plane.
+    `nearby` (3, h, w) is a measure at the plane before, at it and after it: larger the better the plane, and
+    not finite beyond the ends. Total disparities of the planes are evenly spaced. The depth stays within half
+    a step of the best plane.
     """
     total_px = planes.total_disparity_px
     before, at, after = nearby

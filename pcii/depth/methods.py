@@ -16,7 +16,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
 from pcii.depth.depth_planes import check_range_mm
-from pcii.depth.focus_labels import focus_depth
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.types.estimates import DepthMap, DepthPosterior
@@ -29,7 +28,6 @@ Method = Callable[..., DepthMap]
 
 FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
-    "focus": focus_depth,
     **{f"sweep-{width}": f"pcii.baselines.textbook_depth:sweep_{width}" for width in (9, 17, 33)},
     "variance-sweep": "pcii.baselines.textbook_depth:variance_sweep",
 }
@@ -57,10 +55,9 @@ def estimate_depth(
     range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
     by the smoothness of surfaces and by a network that has seen many (docs/theory.md); `depth_posterior` has
     all of it. It alone uses `z_mm` (Z,), the depths of planes in which objects are expected, if any are
-    given. "focus", of photon counts, compares how well planes predict the photons, and abstains more.
-    "sweep-9", "sweep-17" and "sweep-33", of photon counts and with windows of as many px, "variance-sweep"
-    and, of radiance, "structure-tensor" are textbook methods to compare with, which answer wherever there are
-    samples.
+    given. "sweep-9", "sweep-17" and "sweep-33", of photon counts and with windows of as many px,
+    "variance-sweep" and, of radiance, "structure-tensor" are textbook methods to compare with, which answer
+    wherever there are samples.
 
     Warns of frames whose saturation removed more than 2 % of the photons. Raises `InputError` for a range
     that is not 0 < near < far, a single view, a method that is not known or cannot take the data, or one of
@@ -79,7 +76,7 @@ def estimate_depth(
     z_range_mm = _checked_range_mm(data, z_range_mm)
     estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
     if isinstance(estimate, PosteriorDepth):
-        return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm))
+        return depth_map_of(depth_posterior(data, z_range_mm, z_mm=z_mm), z_range_mm)
     warn_of_saturation(data)
     return estimate(data, z_range_mm)
 
@@ -87,11 +84,12 @@ def estimate_depth(
 def depth_posterior(
     data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, z_mm: object = None
 ) -> DepthPosterior:
-    """Probability of each depth in `z_range_mm`, and of no surface there, for blocks of 2 x 2 pixels or more.
+    """Probability of each depth in `z_range_mm`, and of no surface there, for square blocks of pixels.
 
     It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
     value everywhere: where no photon is, that of scenes on average. Of the depths `z_mm` (Z,), if any are
-    given, it says what is in focus there, as the method "posterior" of `segment` does. Raises `InputError` as
+    given, it says what is in focus there, as the method "posterior" of `segment` does; depths within 20 px of
+    total disparity around them are part of it. Raises `InputError` as
     `estimate_depth`.
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
@@ -113,7 +111,7 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     Raises `InputError` for a registered name that is already taken or no file name.
 
     >>> depth_methods()
-    ('posterior', 'focus', 'sweep-9', 'sweep-17', 'sweep-33', 'variance-sweep', 'structure-tensor')
+    ('posterior', 'sweep-9', 'sweep-17', 'sweep-33', 'variance-sweep', 'structure-tensor')
     """
     return REGISTRY.names(_built_in(data))
 

@@ -1,7 +1,7 @@
 """What the network of depth is given: evidence, the posterior of a surface, brightness, coverage.
 
-All of it is without unit and per plane of 1 px of total disparity, so that other cameras, other numbers of
-planes and any amount of light look alike.
+All of it is without unit, of planes between which the total disparity grows by half a block, so that other
+cameras, other numbers of planes, larger blocks and any amount of light look alike.
 """
 
 from typing import Any, NamedTuple
@@ -20,8 +20,8 @@ LEAST_LOG_RATIO, MOST_LOG_RATIO = -8.0, 8.0
 """Ends of the logarithm of a probability relative to all planes being alike."""
 LEAST_PHOTONS, MOST_PHOTONS = 1e-2, 1e3
 """Ends of the mean number of photons in a cell."""
-HINT_WIDTHS_PX = (1.5, 6.0)
-"""Standard deviations, in total disparity, of the nearness of a plane to a requested one."""
+HINT_WIDTHS = (1.5, 6.0)
+"""Standard deviations, in planes, of the nearness of a plane to a requested one."""
 
 
 class NetworkInputs(NamedTuple):
@@ -41,15 +41,15 @@ class NetworkInputs(NamedTuple):
     hint: np.ndarray
 
 
-def hint_of(total_px: np.ndarray, requested_px: np.ndarray) -> np.ndarray:
-    """How near planes of total disparities (Z,) are to requested ones (R,): (Z, 2) float32.
+def hint_of(plane_count: int, requested_planes: np.ndarray) -> np.ndarray:
+    """How near planes are to requested ones (R,), given by their positions among them: (Z, 2) float32.
 
-    For either of `HINT_WIDTHS_PX` a Gaussian of the distance to the nearest one; 0 where none is requested.
+    For either of `HINT_WIDTHS` a Gaussian of the distance to the nearest one; 0 where none is requested.
     """
-    if requested_px.size == 0:
-        return np.zeros((total_px.size, len(HINT_WIDTHS_PX)), np.float32)
-    distance_px = np.abs(total_px[:, None] - requested_px).min(axis=1, keepdims=True)
-    return np.exp(-((distance_px / HINT_WIDTHS_PX) ** 2) / 2).astype(np.float32)
+    if requested_planes.size == 0:
+        return np.zeros((plane_count, len(HINT_WIDTHS)), np.float32)
+    distance = np.abs(np.arange(plane_count)[:, None] - requested_planes).min(axis=1, keepdims=True)
+    return np.exp(-((distance / HINT_WIDTHS) ** 2) / 2).astype(np.float32)
 
 
 def inputs_of(

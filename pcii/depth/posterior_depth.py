@@ -6,7 +6,7 @@ same structure in a part of it (`pcii.evidence.half_agreement`).
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
@@ -27,7 +28,20 @@ from pcii.types.photon_counts import PhotonCounts
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
+PLANES_PER_BLOCK = 2
+"""Planes in which the total disparity grows by a block, as in what the network was trained on."""
+AROUND_PX = 20.0
+"""Depths are compared so far beyond requested planes in total disparity: what is defocused is to be found as
+well."""
 NO_DEPTHS = np.zeros(0)
+
+
+class FilmOutputs(NamedTuple):
+    """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
+    requested planes (R, h, w). And the photons of `TextureEvidence` (Z, h / 4, w / 4)."""
+
+    maps: tuple[np.ndarray, np.ndarray, np.ndarray]
+    photons: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -37,8 +51,12 @@ class PosteriorDepth:
     model: TextureModel = field(default_factory=TextureModel)
     prior: SurfacePrior = field(default_factory=SurfacePrior)
     step_px: float = 1.0
-    """Total disparity between planes."""
+    """Total disparity between planes of the posterior."""
     block_px: int = 2
+    trained_blocks: int = 256
+    """Blocks along the longer side of the films that the network was trained on, which other films are made
+    to look like by larger blocks, or by blocks in four: see `_blocks_px`. If it is larger, films of 1024 px
+    are seen in blocks of 2 px alone; if smaller, films of 256 px."""
     window_px: float = 8.0
     """Standard deviation of the window in which there are to be photons."""
     least_photons: float = 10.0
@@ -64,35 +82,75 @@ class PosteriorDepth:
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
     ) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
-        return depth_map_of(self.posterior(data, z_range_mm, z_mm))
+        return depth_map_of(self.posterior(data, z_range_mm, z_mm), z_range_mm)
 
     def posterior(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
+        self,
+        data: PhotonCounts | Views,
+        z_range_mm: tuple[float, float] | None,
+        z_mm: np.ndarray = NO_DEPTHS,
     ) -> DepthPosterior:
-        """The posterior of planes through the range, and masks of the planes at `z_mm` (R,)."""
+        """The posterior of planes through the range, if any, and around the planes at `z_mm` (R,); masks of
+        these."""
         if isinstance(data, PhotonCounts):
             data = without_hot_pixels(data)
-        planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
-        block_px = self.block_px
-        while len(planes) * data.grid.height * data.grid.width / block_px**2 > MOST_VALUES:
-            block_px *= 2
-        evidence = evidence_of_texture(data, planes, block_px, self.model)
-        requested_px = total_disparity_px(data.grid, z_mm)
+        z_mm, order = np.unique(z_mm, return_inverse=True)
+        planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
+        coarse_px, block_px = self._blocks_px(planes)
+        network = self._film_outputs(data, planes, block_px, z_mm)
+        if coarse_px > block_px:
+            coarse = self._film_outputs(data, planes, coarse_px, z_mm)
+            for mean, other in zip(network.maps, coarse.maps, strict=True):
+                for own, part in zip(mean, other, strict=True):
+                    own += _between_blocks(part, own.shape)
+                mean /= 2
+        probability, nothing, in_focus = network.maps
+        maps = probability, nothing[0], block_px, in_focus[order]
+        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing[0].shape, bool))
+        return replace(posterior, is_detected=self._detected(data, posterior, network.photons))
+
+    def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
+        """Sides of the coarse and of the fine blocks in which the network sees the film.
+
+        In coarse ones it is most like the films of training. Fine ones are half as large, since small things
+        are lost in coarse ones; but not smaller than those of the evidence, so that of small films both are
+        the same.
+        """
+        height, width = planes.grid.shape_HW
+        octaves = round(np.log2(max(height, width) / (self.block_px * self.trained_blocks)))
+        coarse_px = int(self.block_px * 2.0 ** max(octaves, -1))
+        fine_px = min(coarse_px, max(coarse_px // 2, self.block_px))
+        while len(planes) * height * width / fine_px**2 > MOST_VALUES:
+            fine_px *= 2
+        return max(coarse_px, fine_px), fine_px
+
+    def _film_outputs(
+        self, data: PhotonCounts | Views, planes: FocalPlanes, block_px: int, z_mm: np.ndarray
+    ) -> FilmOutputs:
+        """What the network says of the planes, seeing the film in blocks of one size."""
+        grid, step_px = data.grid, block_px / PLANES_PER_BLOCK
+        own_planes = planes
+        if step_px != self.step_px:
+            own_planes = FocalPlanes.between(grid, planes.z_mm.min(), planes.z_mm.max(), step_px)
+        evidence = evidence_of_texture(data, own_planes, max(block_px, self.block_px), self.model)
+        if block_px < self.block_px:
+            evidence = _in_four(evidence, grid.shape_HW)
+        h, w = evidence.nats.shape[1:]
         # Where there are no photons there is no surface, and the depth map has no answer.
-        probability, nothing = np.zeros_like(evidence.nats), np.ones_like(evidence.nats[0])
-        in_focus = np.zeros((z_mm.size, *nothing.shape), np.float32)
+        probability = np.zeros((len(planes), h, w), np.float32)
+        nothing, in_focus = np.ones((1, h, w), np.float32), np.zeros((z_mm.size, h, w), np.float32)
         part = self._part_with_photons(evidence.photons, block_px)
         if part is not None:
-            requested_planes = np.interp(requested_px, planes.total_disparity_px, np.arange(len(planes)))
-            inputs = self.network_inputs(evidence, planes, block_px, requested_px, part)
-            for film, own in zip(
-                (probability, nothing, in_focus), run_network(inputs, requested_planes), strict=True
-            ):
-                target = film[..., *part]
-                target[...] = own[..., : target.shape[-2], : target.shape[-1]]
-        maps = probability, nothing, block_px, in_focus
-        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing.shape, bool))
-        return replace(posterior, is_detected=self._detected(data, posterior, evidence.photons))
+            numbers, total_px = np.arange(len(own_planes)), own_planes.total_disparity_px
+            requested_planes = np.interp(total_disparity_px(grid, z_mm), total_px, numbers)
+            inputs = self.network_inputs(evidence, own_planes, block_px, requested_planes, part)
+            outputs = run_network(inputs, requested_planes)
+            h, w = nothing[0][part].shape
+            probability[:, *part] = _at_planes(outputs.probability[:, :h, :w], len(planes))
+            nothing[:, *part] = outputs.no_surface[:h, :w]
+            in_focus[:, *part] = outputs.in_focus[:, :h, :w]
+        nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
+        return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest])
 
     def _detected(
         self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
@@ -122,16 +180,16 @@ class PosteriorDepth:
         evidence: TextureEvidence,
         planes: FocalPlanes,
         block_px: int,
-        requested_px: np.ndarray,
+        requested_planes: np.ndarray,
         part: tuple[slice, slice] | None = None,
     ) -> NetworkInputs:
         """What the network is given for a part of the film, or for all of it.
 
-        `requested_px` (R,) are the total disparities of planes that are asked about; `part` is rows and
+        `requested_planes` (R,) are the positions of requested planes among the planes; `part` is rows and
         columns of blocks.
         """
         rows, cols = (slice(0, -(-size // MULTIPLE) * MULTIPLE) for size in evidence.nats.shape[1:])
-        hint = hint_of(planes.total_disparity_px, requested_px)
+        hint = hint_of(len(planes), requested_planes)
         samples_per_block = planes.grid.view_count * block_px**2
         return inputs_of(evidence, samples_per_block, self.prior, part or (rows, cols), hint)
 
@@ -165,20 +223,72 @@ class PosteriorDepth:
         return gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
 
 
-def depth_map_of(posterior: DepthPosterior) -> DepthMap:
-    """Depth and confidence of pixels, where the posterior has an answer."""
-    grid = posterior.planes.grid
+def _whole_range_mm(
+    grid: CameraGrid, z_range_mm: tuple[float, float] | None, z_mm: np.ndarray
+) -> tuple[float, float]:
+    """Near and far end of the range and of the depths around `z_mm`, which reach to half of the least total
+    disparity at most."""
+    ends_mm = [] if z_range_mm is None else list(z_range_mm)
+    if z_mm.size:
+        total_px = total_disparity_px(grid, z_mm)
+        farthest_px = max(total_px.min() - AROUND_PX, total_px.min() / 2)
+        around_px = np.array([total_px.max() + AROUND_PX, farthest_px])
+        ends_mm += depth_of_total_disparity_mm(grid, around_px).tolist()
+    return min(ends_mm), max(ends_mm)
+
+
+def depth_map_of(posterior: DepthPosterior, z_range_mm: tuple[float, float]) -> DepthMap:
+    """Depth and confidence of pixels, where the posterior has an answer within the range."""
+    grid, half_px = posterior.planes.grid, 0.5
     _, confidence, total_px = posterior.most_probable()
-    depth_mm = np.where(posterior.is_detected, depth_of_total_disparity_mm(grid, total_px), np.nan)
-    maps = depth_mm, np.where(posterior.is_detected, confidence, 0.0)
+    nearest_px, farthest_px = total_disparity_px(grid, np.array(z_range_mm))
+    is_inside = (total_px > farthest_px - half_px) & (total_px < nearest_px + half_px)
+    is_answered = posterior.is_detected & is_inside
+    depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, farthest_px, nearest_px))
+    maps = np.where(is_answered, depth_mm, np.nan), np.where(is_answered, confidence, 0.0)
     return DepthMap(*(on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps))
+
+
+def _in_four(evidence: TextureEvidence, shape_HW: tuple[int, int]) -> TextureEvidence:
+    """The evidence of each block on four blocks of a quarter of its area, as many as cover the film."""
+    h, w = shape_HW
+    nats, sums, samples = (on_pixels(part, 2, (h, w)) / np.float32(4) for part in evidence[:3])
+    cells = -(-h // CELL_BLOCKS), -(-w // CELL_BLOCKS)
+    return TextureEvidence(nats, sums, samples, on_pixels(evidence.photons, 2, cells) / np.float32(4))
+
+
+def _at_planes(probability: np.ndarray, count: int) -> np.ndarray:
+    """Probabilities of `count` planes (count, h, w) from those of others (Z, h, w) between the same ends.
+
+    Planes are evenly apart. That of a plane between two of fewer planes is given to both, as it is near; of
+    more planes it is interpolated. The sum stays as it is.
+    """
+    Z = len(probability)
+    if count == Z:
+        return probability
+    fewer, more = sorted((count, Z))
+    nearness = np.stack(
+        [np.interp(np.linspace(0, fewer - 1, more), np.arange(fewer), row) for row in np.eye(fewer)]
+    )
+    weights = (nearness if count < Z else nearness.T).astype(np.float32)
+    own = np.tensordot(weights, probability, axes=1)
+    own *= probability.sum(axis=0) / np.maximum(own.sum(axis=0), np.finfo(np.float32).tiny)
+    return own
+
+
+def _between_blocks(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Values (h, w) of blocks half as large, interpolated linearly."""
+    from scipy.ndimage import convolve1d
+
+    fine = on_pixels(coarse, 2, shape)
+    for axis in (0, 1):
+        fine = convolve1d(fine, np.array([0.25, 0.5, 0.25]), axis, mode="nearest")
+    return fine
 
 
 def _agreement_of_film(counts: PhotonCounts, planes: FocalPlanes) -> float:
     """How well two halves of the cameras agree on structure anywhere on the film, as t."""
-    halves = halves_of(counts, planes.take(slice(None, None, 2)))
-    is_cell = np.ones(halves.inside[0].p.shape[1:], bool)
-    return halves.agreement_over(slice(None), slice(None), is_cell)
+    return halves_of(counts, planes.take(slice(None, None, 2))).agreement_of_film()
 
 
 def _halves_agree(

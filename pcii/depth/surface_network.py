@@ -25,12 +25,12 @@ network was not trained on (docs/experiments/depth.md; temperature scaling, Guo 
 BAND_VALUES = 1 << 20
 """Blocks times planes whose last step is done at once by a thread, which takes 0.2 GB."""
 
-FOCUS_PX = 10.0
-"""What is farther from a requested plane in total disparity has a blur half-extent above 5 px, and is
-defocused as far as its depth says."""
-REQUESTED_GAIN, REQUESTED_SIGMA_PX = 2.0, 2.0
+FOCUS_PLANES = 10.0
+"""What is farther from a requested plane has a blur half-extent above 2.5 blocks, and is defocused as far as
+its depth says."""
+REQUESTED_GAIN, REQUESTED_SIGMA = 2.0, 2.0
 """A surface at a requested plane is `1 + REQUESTED_GAIN` times as probable as one elsewhere, about it with a
-standard deviation in total disparity. With a larger gain or a smaller deviation depth is better in little
+standard deviation in planes. With a larger gain or a smaller deviation depth is better in little
 light, and worse where objects are at planes that nobody requested (docs/experiments/depth.md)."""
 MIN_NEAR = 1e-3
 """Added to the probabilities of depths near a plane: of what the depth excludes, shapes may still tell."""
@@ -110,21 +110,21 @@ def depth_prior(Z: int, requested_planes: np.ndarray) -> np.ndarray:
     """How probable a surface at each of Z planes is without any photon, relative to planes that nobody
     requests: (Z,) float32. The request says that objects are near these planes.
     """
-    offset_px = np.arange(Z) - requested_planes[:, None]
-    bumps = np.exp(-((offset_px / REQUESTED_SIGMA_PX) ** 2) / 2)
+    offset = np.arange(Z) - requested_planes[:, None]
+    bumps = np.exp(-((offset / REQUESTED_SIGMA) ** 2) / 2)
     return (1 + REQUESTED_GAIN * bumps.sum(axis=0)).astype(np.float32)
 
 
 def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
-    """Which of Z planes, 1 px of total disparity apart, are near each requested one: (R, Z) float32, 0 or 1.
+    """Which of Z planes are near each requested one: (R, Z) float32, 0 or 1.
 
-    A plane is near the closest requested one, if within `FOCUS_PX`; NaN requests nothing.
+    A plane is near the closest requested one, if within `FOCUS_PLANES`; NaN requests nothing.
     """
     if requested_planes.size == 0:
         return np.zeros((0, Z), np.float32)
     distance = np.abs(np.arange(Z) - np.nan_to_num(requested_planes, nan=np.inf)[:, None])
     is_closest = distance.argmin(axis=0) == np.arange(requested_planes.size)[:, None]
-    return (is_closest & (distance <= FOCUS_PX)).astype(np.float32)
+    return (is_closest & (distance <= FOCUS_PLANES)).astype(np.float32)
 
 
 @cache

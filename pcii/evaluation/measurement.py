@@ -98,13 +98,15 @@ class EvaluationJob:
         estimator, seen = estimator_of(task.method.name), data.counts_or_views
 
         def work() -> Any:
+            z_range_mm = depth_range_of(data, task.z_mm)
             if estimator is not None:
-                z_range_mm, method = depth_range_of(data, task.z_mm), task.method.function or estimator
+                method = task.method.function or estimator
                 planes = planes_of(data, task.z_mm) if has_depths(data, task.z_mm) else None
                 return estimate_depth(seen, z_range_mm, z_mm=planes, method=method)
             assert isinstance(seen, PhotonCounts)
             method = task.method.function or task.method.name
-            return segment(seen, planes_of(data, task.z_mm), method=method)
+            planes = planes_of(data, task.z_mm)
+            return segment(seen, planes, z_range_mm=z_range_mm, method=method)
 
         if (task.light, task.method.name) not in self._warm:
             work()

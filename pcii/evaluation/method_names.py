@@ -76,7 +76,7 @@ def depth_name(estimator: str) -> str:
 def estimator_of(method: str) -> str | None:
     """The estimator of depth that a method's full name means; None for a removal.
 
-    >>> estimator_of("depth:posterior"), estimator_of("likelihood")
+    >>> estimator_of("depth:posterior"), estimator_of("three-step")
     ('posterior', None)
     """
     return method.removeprefix(_PREFIX) if method.startswith(_PREFIX) else None

@@ -123,24 +123,18 @@ class Halves:
             undecided &= ~here & (is_inside | ~outside)
         return agreed
 
-    def agreement_over(self, rows: slice, cols: slice, where: np.ndarray) -> float:
-        """t over the cells `where` (bool) of the box `rows`, `cols`, the largest of all planes and sizes.
+    def agreement_of_film(self) -> float:
+        """t over the whole film, the largest of all planes and sizes of blocks.
 
-        All planes, since the halves may agree best at the plane of a surface in front of a region; of blocks
-        of a size for which they agree better outside the range it is 0. That there is structure is enough:
-        at what depth, the evidence of focus decides.
+        Of blocks of a size for which the halves agree better outside the range it is 0. That there is
+        structure is enough: at what depth, other evidence decides.
         """
-        cells = np.zeros(self.inside[0].p.shape[1:])
-        cells[rows, cols] = where
         largest = 0.0
-        for side, inside, outside in zip(BLOCKS_CELLS, self.inside, self.outside, strict=True):
-            weight = block_sums(cells, side, np.float64)
-            blocks = (slice(None), *np.nonzero(weight))
-            weight, own = weight[blocks[1:]], inside.at(blocks)
-            total = own.p @ weight
-            if total.max() >= (outside.p[blocks] @ weight).max(initial=-np.inf):
-                t = _t(total, np.maximum(own.p**2 @ weight**2, own.noise @ weight**2))
-                largest = max(largest, float(t.max()))
+        for inside, outside in zip(self.inside, self.outside, strict=True):
+            total = inside.p.sum(axis=(1, 2))
+            if total.max() >= outside.p.sum(axis=(1, 2)).max(initial=-np.inf):
+                squares = np.maximum((inside.p**2).sum(axis=(1, 2)), inside.noise.sum(axis=(1, 2)))
+                largest = max(largest, float(_t(total, squares).max()))
         return largest
 
     def _at_labels(

@@ -1,4 +1,4 @@
-"""Compiled: the cells of a section that events fall into, and how many views cover each block of pixels."""
+"""Compiled: the cells of a section that events fall into."""
 
 import numpy as np
 
@@ -14,17 +14,6 @@ def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
     """
     first, last = max(0, shift), min(size, size + shift)
     return first + first % BLOCK_PX, last - last % BLOCK_PX
-
-
-@compiled
-def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
-    """How many camera rows (or columns) cover each row (or column) of blocks, (blocks,) float64."""
-    count = np.zeros(blocks)
-    for camera in range(shifts.size):
-        first, last = _whole_blocks(int(shifts[camera]), size)
-        for place in range(first, last):
-            count[place // BLOCK_PX] += 1.0 / BLOCK_PX
-    return count
 
 
 @compiled

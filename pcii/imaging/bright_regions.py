@@ -1,6 +1,6 @@
 """Bright regions of a section, with outlines along the strongest edges; operations on masks.
 
-The three-step and the likelihood method use it. The gradient is that of Roberts' cross (Muniraj et al. 2017,
+The gradient is that of Roberts' cross (Muniraj et al. 2017,
 Eq. 8), and the outline follows its ridges. Levels follow from the photon noise.
 """
 
@@ -84,13 +84,6 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     if not mask.any():
         return mask
     return ~large_pieces(~large_pieces(mask, smallest_px), smallest_px)
-
-
-def dilated(mask: np.ndarray, steps: int) -> np.ndarray:
-    """The mask dilated `steps` times by the four neighbours of a pixel."""
-    from scipy.ndimage import binary_dilation
-
-    return np.asarray(binary_dilation(mask, iterations=steps), dtype=bool)
 
 
 def box_around(mask: np.ndarray, margin_px: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:

@@ -69,20 +69,6 @@ def cheapest_planes(
     return np.array(planes[: len(cost)], dtype=np.int64)
 
 
-def pieces_alike(pieces: np.ndarray, photons: np.ndarray) -> Iterator[np.ndarray]:
-    """Masks (H, W) bool of the pieces, then of the pieces made by merging those of most similar photon rates.
-
-    `photons` (C, H, W) by colour. Two are similar if one rate for both, in each colour, costs little
-    log-likelihood for the length of their border (after Koepfler, Lopez and Morel 1994).
-    """
-    tree = _MergingByRate(pieces, photons)
-    members = [[piece] for piece in range(len(tree.areas))]
-    for a, b, _, _ in tree.weakest_first(lambda area, next_area: True):
-        members.append(members[a] + members[b])
-    for leaves in members[1:]:  # number 0 is outside all pieces
-        yield np.isin(pieces, leaves)
-
-
 class _Merging:
     """Pieces, their areas and the borders between them, while they are merged."""
 
@@ -128,36 +114,6 @@ class _Merging:
         for neighbour, (height, length) in borders.items():
             self.borders[neighbour][joined] = (height, length)
             heapq.heappush(self.queue, (self.strength(neighbour, joined), neighbour, joined))
-
-
-class _MergingByRate(_Merging):
-    """Merging of pieces whose borders are as strong as their photon rates differ."""
-
-    def __init__(self, pieces: np.ndarray, photons: np.ndarray) -> None:
-        numbers, count = pieces.ravel(), int(pieces.max()) + 1
-        by_colour = [np.bincount(numbers, colour.ravel(), count) for colour in photons]
-        self.photons = list(np.stack(by_colour, axis=-1))
-        super().__init__(pieces, np.zeros(pieces.shape), np.bincount(numbers).tolist())
-
-    def strength(self, a: int, b: int) -> float:
-        """Log-likelihood in nats that one rate for both costs, per pair of pixels along their border."""
-        separate = _log_likelihood(self.photons[a], self.areas[a])
-        separate += _log_likelihood(self.photons[b], self.areas[b])
-        together = _log_likelihood(self.photons[a] + self.photons[b], self.areas[a] + self.areas[b])
-        return (separate - together) / self.borders[a][b][1]
-
-    def _merge(self, a: int, b: int) -> None:
-        self.photons.append(self.photons[a] + self.photons[b])
-        super()._merge(a, b)
-
-
-def _log_likelihood(photons: np.ndarray, area: float) -> float:
-    """Poisson log-likelihood of photons (C,) on an area at their maximum-likelihood rates, less a constant.
-
-    It is the sum of K log(K / area) - K over colours; the sum of K does not change as pieces are merged.
-    """
-    positive = photons[photons > 0]
-    return float((positive * np.log(positive / area)).sum())
 
 
 def _borders(pieces: np.ndarray, edges: np.ndarray) -> Iterator[tuple[int, int, float, int]]:

@@ -1,8 +1,8 @@
 """Removal methods by name: which points of each section are in focus."""
 
 from pcii.base.extensions import MethodRegistry
+from pcii.depth.depth_planes import check_range_mm
 from pcii.removal import plugins
-from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import remove_by_network
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation
@@ -12,14 +12,21 @@ from pcii.types.focal_planes import check_depth_counts
 from pcii.types.photon_counts import PhotonCounts
 
 
-def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
+def segment(
+    counts: PhotonCounts,
+    z_mm: object,
+    *,
+    z_range_mm: tuple[float, float] | None = None,
+    method: str | plugins.Method = "posterior",
+) -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
-    `method` is one of `pcii.removal_methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood",
-    "posterior" (of depth), a simple one to compare them with ("brightness", "variance",
-    "shape-from-focus"), or one that an installed package registers; or a function that returns a `Segmented`
+    `method` is one of `pcii.removal_methods()`: "posterior", by the network of depth; "three-step" (Muniraj
+    et al. 2017, Eqs. 7-9); a simple one to compare them with ("brightness", "variance", "shape-from-focus");
+    or one that an installed package registers; or a function that returns a `Segmented`
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
-    objects, their colours or their depths.
+    objects, their colours or their depths. "posterior" alone uses `z_range_mm` (near, far): surfaces may be
+    there, or else within 20 px of total disparity around the planes.
     Without photons nothing is in focus. Warns of frames whose saturation removed more than 2 % of the
     photons. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a method of
     others that fails, writes into what it is given, or whose result is not a `Segmented` of these sections.
@@ -42,7 +49,10 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     check_depth_counts(counts)
     remove = find_method(method)
     warn_of_saturation(counts)
-    return remove(counts, reconstruct(counts, z_mm))
+    sections = reconstruct(counts, z_mm)
+    if remove is remove_by_network and z_range_mm is not None:
+        return remove_by_network(counts, sections, check_range_mm(counts.grid, z_range_mm))
+    return remove(counts, sections)
 
 
 def removal_methods() -> tuple[str, ...]:
@@ -51,7 +61,7 @@ def removal_methods() -> tuple[str, ...]:
     Raises `InputError` for a registered name that is already taken or no file name.
 
     >>> removal_methods()[:2]
-    ('three-step', 'likelihood')
+    ('three-step', 'posterior')
     """
     return REGISTRY.names()
 
@@ -63,7 +73,6 @@ def find_method(method: str | plugins.Method) -> plugins.Method:
 
 METHODS: dict[str, plugins.Method | str] = {
     "three-step": ThreeStep(),
-    "likelihood": remove_by_likelihood,
     "posterior": remove_by_network,
     "brightness": "pcii.baselines.simple_removals:brightness",
     "variance": "pcii.baselines.simple_removals:variance",
@@ -71,5 +80,5 @@ METHODS: dict[str, plugins.Method | str] = {
 }
 """The built-in methods; those to compare with are loaded when they are asked for."""
 REGISTRY = MethodRegistry(plugins.GROUP, METHODS, plugins.checked)
-DEFAULT_METHODS = ("three-step", "likelihood")
+DEFAULT_METHODS = ("three-step", "posterior")
 """The methods of `pcii run` without `--method`."""

@@ -182,7 +182,7 @@ def make(
         verdict = certify(definition, file, out, report)
     complain_of(verdict.problems)
     say(f"{out / CERTIFICATE}: {verdict.sentence()}")
-    say_next("pcii", "benchmark", "run", "likelihood", "--data", out, "-o", out.parent / "submission")
+    say_next("pcii", "benchmark", "run", "posterior", "--data", out, "-o", out.parent / "submission")
     return 1 if verdict.problems else 0
 
 

@@ -1,7 +1,6 @@
 """Every scene and recipe that ships: it loads, shows what it names, and is in the gallery."""
 
 import importlib.util
-import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -140,21 +139,6 @@ def test_the_papers_objects_are_on_average_at_its_depths() -> None:
     mean = {name: hits.z_mm[hits.object_id == number].mean() for number, name in built.names.items()}
     # 4000 pixels each, whose depths have a standard deviation of 7 mm; 0.5 mm are 0.1 px of total disparity.
     assert mean == pytest.approx({"ball": 540, "bird": 620}, abs=0.5)
-
-
-def test_the_corpus_has_two_halves_of_every_kind_and_no_scene_in_both() -> None:
-    entries = tomllib.loads((ROOT / "benchmarks" / "corpus.toml").read_text(encoding="utf-8"))["scene"]
-    assert {entry["recipe"] for entry in entries} <= set(RECIPES)
-    recipes = {
-        entry["recipe"]: load_recipe(str(ROOT / "data_recipes" / f"{entry['recipe']}.toml"))[0]
-        for entry in entries
-    }
-    assert len({recipe.scene for recipe in recipes.values()}) == len(entries)  # each once, so in one half
-    assert len({recipe.seed for recipe in recipes.values()}) == len(entries)
-    assert all(recipe.photons.scope != "exposure" for recipe in recipes.values())  # photons can be swept
-    kinds_of = {half: {one["kind"] for one in entries if one["half"] == half} for half in ("train", "test")}
-    assert {entry["half"] for entry in entries} == set(kinds_of)
-    assert kinds_of["train"] == kinds_of["test"] | {"paper"}
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -65,7 +65,7 @@ def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys
     assert (tmp_path / "sections" / "section_600mm.png").is_file()
 
 
-@pytest.mark.parametrize("command", [["segment"], ["run", "--method", "likelihood"]])
+@pytest.mark.parametrize("command", [["segment"], ["run", "--method", "posterior"]])
 def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
     save_dataset(tmp_path / "d", Views(LIGHT, GRID), z_mm=500)
     assert run(command[0], tmp_path / "d", "-o", tmp_path / "out", *command[1:]) == 2

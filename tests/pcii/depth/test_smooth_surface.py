@@ -72,7 +72,7 @@ def test_blocks_without_evidence_follow_their_neighbours_less_the_farther() -> N
 
 
 def test_larger_blocks_serve_where_memory_ends(two_squares, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(posterior_depth, "MOST_VALUES", 100_000)
+    monkeypatch.setattr(posterior_depth, "MOST_VALUES", 400_000)
     depth = estimate_depth(two_squares.counts, (1 / 9, 1.0))
     for plane in (0, 1):
         found = depth.z_mm[two_squares.masks[plane]]

@@ -95,7 +95,7 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     grid = two_squares.counts.grid
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
-    samples, hint = grid.view_count * METHOD.block_px**2, hint_of(planes.total_disparity_px, np.array([4.0]))
+    samples, hint = grid.view_count * METHOD.block_px**2, hint_of(len(planes), np.array([2.0]))
     film = slice(0, 2 * -(-evidence.nats.shape[1] // 2)), slice(0, 2 * -(-evidence.nats.shape[2] // 2))
     own = inputs_of(evidence, samples, SurfacePrior(), film, hint)
     turned = inputs_of(
@@ -123,11 +123,10 @@ def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
 
 
 def test_a_hint_says_how_near_a_plane_is_to_the_nearest_requested_one() -> None:
-    total_px = np.arange(2.0, 8.0)
-    hint = hint_of(total_px, np.array([3.0, 30.0]))
-    np.testing.assert_allclose(hint[:, 0], np.exp(-(((total_px - 3) / 1.5) ** 2) / 2), rtol=1e-6)
+    hint = hint_of(6, np.array([1.0, 28.0]))
+    np.testing.assert_allclose(hint[:, 0], np.exp(-(((np.arange(6) - 1) / 1.5) ** 2) / 2), rtol=1e-6)
     assert (np.diff(hint[1:, 1]) < 0).all()
-    assert not hint_of(total_px, np.zeros(0)).any()
+    assert not hint_of(6, np.zeros(0)).any()
 
 
 def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() -> None:

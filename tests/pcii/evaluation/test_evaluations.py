@@ -220,8 +220,8 @@ def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
     ("methods", "sentence"),
     [
         ([by_count, ("by_count", two_rows)], "methods: 'by_count' is there twice"),
-        ([("likelihood", by_count)], "methods: the name 'likelihood' is taken"),
-        (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:focus"),
+        ([("three-step", by_count)], "methods: the name 'three-step' is taken"),
+        (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:sweep-9"),
     ],
 )
 def test_methods_that_cannot_be_compared_are_refused(

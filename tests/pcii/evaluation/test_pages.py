@@ -114,7 +114,7 @@ def rows_of(name: str) -> list[dict[str, Any]]:
         for budget, iou in ((NESTED, 0.9), (OWN, 0.5))
     ]
     shown = [{key: row[key] for key in row if key != "planes"} for row in removal if row["method"] == name]
-    return removal + [row | {"method": "depth:focus"} | depth for row in shown]
+    return removal + [row | {"method": "depth:sweep-17"} | depth for row in shown]
 
 
 @pytest.mark.parametrize("which", ["report.html", "evaluation.html"])

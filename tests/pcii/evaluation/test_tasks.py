@@ -36,7 +36,6 @@ IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
 OF_COUNTS = [
     "depth:posterior",
-    "depth:focus",
     *(f"depth:sweep-{width}" for width in (9, 17, 33)),
     "depth:variance-sweep",
 ]
@@ -111,7 +110,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
     ("has", "methods", "budgets", "sentence"),
     [
         ("counts", ["depth:structure-tensor"], [], "'depth:structure-tensor' needs radiance, and of .*; use"),
-        ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
+        ("views", ["posterior"], [], "'posterior' needs photon counts, and of .*alone radiance would"),
         ("counts", [], [FULL_LIGHT], "has no budget full-light; there are exposure"),
     ],
 )

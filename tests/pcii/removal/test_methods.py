@@ -1,10 +1,9 @@
-import math
 from functools import cache
 
 import numpy as np
 import pytest
 from property_settings import mostly_slow
-from twins import even_light, intersection_over_union, opaque_views, photons_of, unit_grid
+from twins import even_light, intersection_over_union, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks
@@ -14,7 +13,7 @@ from pcii.store.dataset import sample
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 
-ABLE = ["three-step", "likelihood", "posterior"]
+ABLE = ["three-step", "posterior"]
 methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "variance", "shape-from-focus"])
 able = pytest.mark.parametrize("method", ABLE)
 
@@ -100,51 +99,8 @@ def test_one_view_is_refused(method):
 
 
 def test_an_unknown_method_is_refused_with_the_known_ones(two_squares):
-    with pytest.raises(InputError, match=r"^method: .*'magic'.*three-step.*likelihood"):
+    with pytest.raises(InputError, match=r"^method: .*'magic'.*three-step.*posterior"):
         segment(two_squares.counts, two_squares.z_mm, method="magic")
-
-
-RADIUS_PX = 24
-DISC_GRID = unit_grid(9, 9, 168, 168)  # spread 8 / z: discs of the disparities 3 and 5 are 16 px apart
-
-
-def disc_mask(row: int, col: int) -> np.ndarray:
-    i, j = np.mgrid[: DISC_GRID.height, : DISC_GRID.width]
-    return np.hypot(i - row, j - col) <= RADIUS_PX
-
-
-def plain_discs(*discs: tuple[int, int, int], per_view: float, seed: int = 0) -> PhotonCounts:
-    """White discs at (row, column, disparity) before a hundredth of their light."""
-    patch = np.hypot(*(np.mgrid[: 2 * RADIUS_PX + 1, : 2 * RADIUS_PX + 1] - RADIUS_PX)) <= RADIUS_PX
-    white = np.repeat(patch[..., None].astype(float), 3, axis=2)
-    places = [(white, row - RADIUS_PX, col - RADIUS_PX, disparity) for row, col, disparity in discs]
-    return photons_of(opaque_views(places, DISC_GRID), DISC_GRID, per_view, seed=seed, dark=0.01)
-
-
-def test_plain_discs_are_found_at_their_depths_and_better_with_more_light():
-    places = ((50, 52, 3), (118, 116, 5))
-    masks = [disc_mask(row, col) for row, col, _ in places]
-    found = []
-    for per_view in (30, 3000):
-        focus = segment(plain_discs(*places, per_view=per_view), [1 / 3, 1 / 5], method="likelihood")
-        found.append([intersection_over_union(focus.in_focus[p], masks[p]) for p in (0, 1)])
-        # At 30 photons a view one lands in every second pixel of the discs; an outline that is 1 px off
-        # all along loses 2 / 24.
-        assert min(found[-1]) > 1 - 2 / RADIUS_PX
-    # Ten pixels more or less are chance: 1 in 15 of those along the outline.
-    assert np.all(np.diff(found, axis=0) > -10 / (math.pi * RADIUS_PX**2))
-
-
-@pytest.mark.parametrize(
-    ("asked", "per_view"), mostly_slow([(3, 30), (3, 300), (5, 30), (5, 300)], quick=[(3, 300), (5, 30)])
-)
-def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
-    place = (82, 84, 8 - asked)
-    counts = plain_discs(place, per_view=per_view)
-    focus = segment(counts, [1 / asked, 1 / (8 - asked)], method="likelihood")
-    assert not focus.in_focus[0].any()
-    assert intersection_over_union(focus.in_focus[1], disc_mask(*place[:2])) > 1 - 2 / RADIUS_PX
-    assert not segment(counts, [1 / asked], method="likelihood").in_focus.any()
 
 
 @pytest.mark.parametrize("share", [0.5, 0.1])
@@ -152,7 +108,7 @@ def test_round_things_are_whole_though_less_than_5_px_of_spread_part_the_planes(
     data = sample()
     assert data.truth is not None
     kept = data.counts.subsample(share * data.counts.events.n.sum(), np.random.default_rng(0))
-    in_focus = segment(kept, [540, 620], method="likelihood").in_focus
+    in_focus = segment(kept, [540, 620], method="posterior").in_focus
     for own, mask in enumerate(in_focus, start=1):
         here = np.asarray(data.truth.object_id) == own
         # Their radius is 19 px: the outline may be a pixel off all along.
@@ -163,14 +119,14 @@ def test_round_things_are_whole_though_less_than_5_px_of_spread_part_the_planes(
 def test_a_flat_film_is_never_claimed(rate):
     grid = unit_grid(7, 7, 160, 144)
     for seed in range(2):
-        focus = segment(even_light(grid, rate, seed, "GRBG"), [1 / 2, 1 / 5], method="likelihood")
+        focus = segment(even_light(grid, rate, seed, "GRBG"), [1 / 2, 1 / 5], method="posterior")
         assert not focus.in_focus.any()
 
 
 def test_a_depth_that_is_asked_for_twice_is_answered_twice(two_squares, found):
     first, second = two_squares.z_mm
-    twice = segment(two_squares.counts, [first, second, first], method="likelihood")
-    once = found("likelihood")
+    twice = segment(two_squares.counts, [first, second, first], method="posterior")
+    once = found("posterior")
     np.testing.assert_array_equal(twice.in_focus[:2], once.in_focus)
     np.testing.assert_array_equal(twice.in_focus[2], once.in_focus[0])
 

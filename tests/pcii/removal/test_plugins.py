@@ -108,12 +108,12 @@ def test_an_unknown_method_is_reported_with_those_of_packages(tmp_path, monkeypa
 
 
 def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, likelihood="strange_code:good")
+    install(tmp_path, monkeypatch, posterior="strange_code:good")
     with pytest.raises(
-        InputError, match=r"strange_code:good of the package strange needs another name than 'likelihood'"
+        InputError, match=r"strange_code:good of the package strange needs another name than 'posterior'"
     ):
         removal_methods()
-    assert segment(counts(), 1.0, method="likelihood").method == "likelihood"
+    assert segment(counts(), 1.0, method="posterior").method == "posterior"
 
 
 def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):

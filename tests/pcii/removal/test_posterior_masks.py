@@ -3,7 +3,7 @@ import numpy as np
 from pcii.depth.methods import depth_posterior
 from pcii.depth.posterior_depth import depth_map_of
 from pcii.removal.methods import segment
-from pcii.removal.posterior_masks import masks_of, range_around_mm
+from pcii.removal.posterior_masks import masks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.estimates import DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
@@ -26,9 +26,10 @@ def test_a_block_belongs_to_the_most_probable_plane_or_to_none(two_squares):
 
 def test_nothing_is_claimed_where_the_depth_map_has_no_answer(two_squares):
     planes = FocalPlanes.at_depths(two_squares.grid, two_squares.z_mm)
-    posterior = depth_posterior(two_squares.counts, range_around_mm(planes), z_mm=planes)
-    focus = segment(two_squares.counts, two_squares.z_mm, method="posterior")
+    range_mm = 0.8 * planes.z_mm.min(), 1.25 * planes.z_mm.max()
+    posterior = depth_posterior(two_squares.counts, range_mm, z_mm=planes)
+    focus = segment(two_squares.counts, two_squares.z_mm, z_range_mm=range_mm, method="posterior")
     claimed = focus.in_focus.any(axis=0)
     assert claimed.any()
-    assert np.isfinite(depth_map_of(posterior).z_mm[claimed]).all()
+    assert np.isfinite(depth_map_of(posterior, range_mm).z_mm[claimed]).all()
     np.testing.assert_array_equal(masks_of(posterior, focus.sections).in_focus, focus.in_focus)
