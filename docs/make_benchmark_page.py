@@ -35,7 +35,8 @@ The methods of removal that ship, on the test half of [the benchmark](../benchma
 has the scores of each scene with their intervals, and depth. Made by `docs/make_benchmark_page.py`;
 times are of {machine}.
 
-[Removal of defocused points](../removal.md) describes the methods; [the three steps](three_step.md) show what limits them.
+[Removal of defocused points](../removal.md) describes the methods; [the three steps](three_step.md) show what
+limits them.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
