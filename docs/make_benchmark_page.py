@@ -41,7 +41,7 @@ limits them.
 ![IoU against photons and against time](removal_scores.jpg)
 
 *Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws
-of photons. What leans belongs to no one plane: it counts by pixel and in depth.*
+of photons, at {lights} photons per view. What leans belongs to no one plane: it counts by pixel and in depth.*
 
 ## Where the network's IoU falls with more photons
 
@@ -59,7 +59,8 @@ def main(submissions: Path, machine: str) -> None:
     kinds = {scene.name: scene.kind for scene in load_definition(BENCHMARK)[0].scene}
     table = results(submissions)
     found = "\n".join(falls(table)) or "- nowhere"
-    text = PAGE.format(page=page, machine=machine, falls=found, fall=FALL)
+    lights = ", ".join(f"{light:g}" for light in sorted(table["light"][table["measure"] == "iou"].unique()))
+    text = PAGE.format(page=page, machine=machine, falls=found, fall=FALL, lights=lights)
     (DOCS / "experiments" / "removal_scores.md").write_text(text, encoding="utf-8")
     draw(table, kinds, DOCS / "experiments" / "removal_scores.jpg")
 
