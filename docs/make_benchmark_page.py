@@ -41,7 +41,8 @@ limits them.
 ![IoU against photons and against time](removal_scores.jpg)
 
 *Mean IoU with the objects of each plane over the scenes of a kind that hold any, each the mean of its draws
-of photons, at {lights} photons per view. What leans belongs to no one plane: it counts by pixel and in depth.*
+of photons, at {lights} photons per view. What leans belongs to no one plane: it counts
+by pixel and in depth.*
 
 ## Where the network's IoU falls with more photons
 
