@@ -239,10 +239,11 @@ def _whole_range_mm(
 
 def depth_map_of(posterior: DepthPosterior, z_range_mm: tuple[float, float]) -> DepthMap:
     """Depth and confidence of pixels, where the posterior has an answer within the range."""
-    grid, half_px = posterior.planes.grid, 0.5
+    grid = posterior.planes.grid
+    tolerance_px = 0.5  # half the distance between planes: a surface at an end may lie so far beyond it
     _, confidence, total_px = posterior.most_probable()
     nearest_px, farthest_px = total_disparity_px(grid, np.array(z_range_mm))
-    is_inside = (total_px > farthest_px - half_px) & (total_px < nearest_px + half_px)
+    is_inside = (total_px > farthest_px - tolerance_px) & (total_px < nearest_px + tolerance_px)
     is_answered = posterior.is_detected & is_inside
     depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, farthest_px, nearest_px))
     maps = np.where(is_answered, depth_mm, np.nan), np.where(is_answered, confidence, 0.0)
@@ -267,13 +268,12 @@ def _at_planes(probability: np.ndarray, count: int) -> np.ndarray:
     if count == Z:
         return probability
     fewer, more = sorted((count, Z))
-    nearness = np.stack(
-        [np.interp(np.linspace(0, fewer - 1, more), np.arange(fewer), row) for row in np.eye(fewer)]
-    )
+    places = np.linspace(0, fewer - 1, more)
+    nearness = np.stack([np.interp(places, np.arange(fewer), row) for row in np.eye(fewer)])
     weights = (nearness if count < Z else nearness.T).astype(np.float32)
-    own = np.tensordot(weights, probability, axes=1)
-    own *= probability.sum(axis=0) / np.maximum(own.sum(axis=0), np.finfo(np.float32).tiny)
-    return own
+    resampled = np.tensordot(weights, probability, axes=1)
+    resampled *= probability.sum(axis=0) / np.maximum(resampled.sum(axis=0), np.finfo(np.float32).tiny)
+    return resampled
 
 
 def _between_blocks(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
