@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -123,9 +124,12 @@ def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
 
     def start(*arguments: str) -> subprocess.Popen[str]:
+        # What a shell starts in the background ignores Ctrl-C, and so does all that this starts.
+        listens = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
         pipes: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
         command = [sys.executable, *arguments]
-        processes.append(subprocess.Popen(command, env=environment, start_new_session=True, **pipes))
+        options = pipes | {"start_new_session": True, "preexec_fn": listens}
+        processes.append(subprocess.Popen(command, env=environment, **options))
         return processes[-1]
 
     yield start
