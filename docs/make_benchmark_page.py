@@ -99,7 +99,7 @@ def draw(table: pd.DataFrame, kinds: Mapping[str, str], file: Path) -> None:
             axes[0, column].plot(
                 own.index.get_level_values("light").to_list(), own["iou"], label=method, **style
             )
-            axes[1, column].plot(own["seconds"], own["iou"], **style)
+            axes[1, column].plot(own["seconds"], own["iou"], linestyle="none", **style)
         axes[0, column].set(title=kind, xlabel="photons per view")
         axes[1, column].set(xlabel="seconds")
     for axis in axes.flat:
