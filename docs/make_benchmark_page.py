@@ -46,7 +46,7 @@ by pixel and in depth.*
 
 ## Where the network's IoU falls with more photons
 
-By more than {fall:g} in the mean over draws; in brackets the 95 % interval, wide where there are three draws:
+By more than {fall:g} in the mean over draws; in brackets the 95 % interval, where there are several:
 
 {falls}
 """
