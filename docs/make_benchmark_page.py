@@ -46,7 +46,7 @@ by pixel and in depth.*
 
 ## Where the network's IoU falls with more photons
 
-By more than {fall:g} in the mean over draws; in brackets the 95 % interval, wide where there are three draws:
+By more than {fall:g} in the mean over draws; in brackets the 95 % interval, where there are several:
 
 {falls}
 """
@@ -99,7 +99,7 @@ def draw(table: pd.DataFrame, kinds: Mapping[str, str], file: Path) -> None:
             axes[0, column].plot(
                 own.index.get_level_values("light").to_list(), own["iou"], label=method, **style
             )
-            axes[1, column].plot(own["seconds"], own["iou"], **style)
+            axes[1, column].plot(own["seconds"], own["iou"], linestyle="none", **style)
         axes[0, column].set(title=kind, xlabel="photons per view")
         axes[1, column].set(xlabel="seconds")
     for axis in axes.flat:

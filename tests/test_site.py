@@ -22,3 +22,14 @@ def test_the_page_of_camera_sets_is_what_its_script_makes_of_the_measurements() 
     script = runpy.run_path(str(DOCS / "make_camera_sets.py"))
     rows = script["read"](DOCS / "camera_sets.csv")
     assert script["page"](rows) == (DOCS / "camera_sets.md").read_text(encoding="utf-8")
+
+
+def test_the_glossary_names_rooms_and_modules_that_are_there() -> None:
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    last_cells = re.findall(r"^\|.*\|(.*)\|$", text, re.MULTILINE)
+    places = [place for cell in last_cells for place in re.findall(r"`([\w.]+)`", cell)]
+    assert len(places) > 20
+    for place in places:
+        folder = "" if place.startswith("simgen") else "pcii"
+        path = DOCS.parent / folder / place.replace(".", "/")
+        assert path.is_dir() or path.with_suffix(".py").is_file(), place

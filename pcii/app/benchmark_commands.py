@@ -39,6 +39,9 @@ def run(
     out: ScoresOut,
     half: OfHalf = "test",
     budget: tuple[str, ...] = (),
+    authors: str | None = None,
+    url: str | None = None,
+    trained_on: str | None = None,
     executor: Workers = THIS_PROCESS,
 ) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
@@ -54,10 +57,19 @@ def run(
         A method of removal, or depth:NAME; or module:function or file.py:function, after depth: for depth.
     budget
         The only photons per view to score at, or full-light; may be repeated. For a first look.
+    authors
+        Whose method it is, for the page of all submissions.
+    url
+        Where its code or its paper is.
+    trained_on
+        What a network has seen.
     """
+    about = {"authors": authors, "url": url, "trained_on": trained_on}
     with Stages() as report:
         opened = open_benchmark(data, half)
-        evaluation = run_method(method, opened, out, budgets=budget, executor=executor, report=report)
+        evaluation = run_method(
+            method, opened, out, budgets=budget, about=about, executor=executor, report=report
+        )
     say_scores(out, evaluation)
 
 

@@ -111,10 +111,9 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float], window
         expected = (photons * np.maximum(samples - 1, 0) + samples * PRIOR_PHOTONS) / weight
         nats = photons * np.log(rate / mean) - (expected - samples * mean)
         nats = np.where(around > 0, nats, 0.0)
-        smooth = gaussian_filter(nats.sum(axis=-1), sigma_px / side, mode="constant")
-        return on_pixels(smooth, side, data.grid.shape_HW)
+        return gaussian_filter(nats.sum(axis=-1), sigma_px / side, mode="constant")
 
-    return _swept(data, z_range_mm, gain)
+    return _swept(data, z_range_mm, gain, side)
 
 
 sweep_9, sweep_17, sweep_33 = (partial(likelihood_sweep, window_px=width) for width in (9, 17, 33))
@@ -125,14 +124,16 @@ def _swept(
     data: PhotonCounts | Views,
     z_range_mm: tuple[float, float],
     measure: Callable[[Sections, int], np.ndarray],
+    side: int = 1,
     **options: Any,
 ) -> DepthMap:
-    """The depth of the plane of largest measure, (H, W) for sections and the number of one of their planes.
+    """The depth of the plane of largest measure, (h, w) for sections and the number of one of their planes.
 
-    Sections, which have these `options`, are made of a few planes at a time.
+    A measure is of cells of `side` x `side` pixels. Sections, which have these `options`, are made of a few
+    planes at a time.
     """
     planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
-    nothing = np.full(data.grid.shape_HW, -np.inf)
+    nothing = np.full([-(-size // side) for size in data.grid.shape_HW], -np.inf)
     best, nearby = np.zeros(nothing.shape, np.int64), np.stack([nothing] * 3)
     last, least = nothing, -nothing
     for first in range(0, len(planes), BATCH):
@@ -146,6 +147,7 @@ def _swept(
             last, least = current, np.minimum(least, current)
     # Where all planes are alike there is nothing to choose from.
     depth = np.where(nearby[1] > least, peak_depth_mm(planes, best, nearby), np.nan)
+    depth = on_pixels(depth, side, data.grid.shape_HW)
     return DepthMap(depth, np.isfinite(depth).astype(np.float64))
 
 

@@ -207,8 +207,10 @@ def _submission_table(
                 method,
                 str(about.get("authors", "–")),
                 str(about.get("url", "–")),
+                str(about.get("trained_on", "–")),
                 str(len(frame[frame["method"] == method].drop_duplicates(["identity", "light"]))),
                 shlex.join(["pcii", "benchmark", *work, *options]),
             )
         )
-    return Table("Submissions", ("method", "authors", "url", "scores", "command"), tuple(rows), words=3)
+    header = ("method", "authors", "url", "trained on", "scores", "command")
+    return Table("Submissions", header, tuple(rows), words=4)

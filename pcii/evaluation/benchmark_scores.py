@@ -7,6 +7,7 @@ Photons, frames and full light of a scene are datasets of their own, and one sce
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pcii.base.errors import InputError
@@ -93,13 +94,15 @@ def run_method(
     out: Path,
     *,
     budgets: Sequence[str] = (),
+    about: Mapping[str, str | None] = MappingProxyType({}),
     executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> Evaluation:
     """Score a method on one half of a benchmark, in the folder `out`.
 
     `method` is a name, as of `pcii.evaluate`. Without `budgets` it is scored at all light that there is. Rows
-    that are in the folder already are kept, as by `evaluate`. Raises `InputError` for a method that is not
+    that are in the folder already are kept, as by `evaluate`. `about` are further members of submission.json.
+    Raises `InputError` for a method that is not
     there, for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_method(method)
@@ -116,8 +119,9 @@ def run_method(
     if not tasks:
         words = " or ".join(budgets) or "light that it takes"
         raise InputError(f"budget: no dataset of the {data.half} half that {method!r} can take has {words}")
-    about = {"method": named.name, "made": "run by pcii benchmark run", "command_name": method}
-    return _score(BenchmarkJob(tasks, data), data, out, about, executor, report)
+    whose = {name: text for name, text in about.items() if text}
+    whose |= {"method": named.name, "made": "run by pcii benchmark run", "command_name": method}
+    return _score(BenchmarkJob(tasks, data), data, out, whose, executor, report)
 
 
 def score_submission(

@@ -68,6 +68,8 @@ def accuracy_chart(
                 continue
             bars = np.maximum(0, [own["mean"] - own["low"], own["high"] - own["mean"]])
             style = _line_style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
+            if place == "seconds":  # they hardly follow the light, so that a line would go to and fro
+                style["linestyle"] = "none"
             handles[plot_label(method)] = axes.errorbar(own[place], own["mean"], yerr=bars, **style)
         axes.set_xlabel(places[place])
         if is_share:

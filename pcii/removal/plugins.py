@@ -16,7 +16,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import called
-from pcii.types.estimates import Segmented
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
 
@@ -34,7 +34,8 @@ def checked(remove: Callable[..., object], label: str, name: str | None = None) 
     def method(counts: PhotonCounts, sections: Sections) -> Segmented:
         result = called(remove, label, counts, sections)
         if not isinstance(result, Segmented):
-            raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}")
+            advice = "; for a method of depth write depth: before it" if isinstance(result, DepthMap) else ""
+            raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}{advice}")
         requirement = _unmet_requirement(result, name, counts, sections)
         if requirement:
             raise InputError(f"{label} must return {requirement}")

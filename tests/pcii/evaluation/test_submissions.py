@@ -114,14 +114,15 @@ def test_functions_of_ones_own_are_run_each_into_a_folder_of_its_own(
 def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, tmp_path: Path) -> None:
     folder, out = tmp_path / "submissions", tmp_path / "page.html"
     shutil.copytree(scored.folder, folder / "theirs")
-    run_method("depth:posterior", data, folder / "ours")
+    about = {"authors": "B. C.", "url": None, "trained_on": "drawn scenes"}
+    run_method("depth:posterior", data, folder / "ours", about=about)
     edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "a; b')(folder / "ours")
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()
     assert "small: methods compared" in text
     bounds = [comparison.bound for comparison in COMPARISONS if comparison.bound]
-    for method in ("mine", "depth:mine", "depth:posterior", *bounds):
-        assert f">{method}</td>" in text
+    for words in ("mine", "depth:mine", "depth:posterior", *bounds, "B. C.", "drawn scenes"):
+        assert f">{words}</td>" in text
     assert "pcii benchmark score MAPS --data BENCHMARK --half development -o submissions/theirs" in text
     assert "pcii benchmark run &#39;a; b&#39; --data" in text  # as one word of a shell
     shutil.copytree(folder / "ours", folder / "again")
