@@ -68,7 +68,7 @@ def run(
     with Stages() as report:
         opened = open_benchmark(data, half)
         evaluation = run_method(
-            method, opened, out, budgets=budget, about=about, executor=executor, report=report
+            method, opened, out, budgets=budget, executor=executor, report=report, **about
         )
     say_scores(out, evaluation)
 

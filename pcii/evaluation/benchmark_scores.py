@@ -7,7 +7,6 @@ Photons, frames and full light of a scene are datasets of their own, and one sce
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from pcii.base.errors import InputError
@@ -94,16 +93,16 @@ def run_method(
     out: Path,
     *,
     budgets: Sequence[str] = (),
-    about: Mapping[str, str | None] = MappingProxyType({}),
     executor: Executor = THIS_PROCESS,
     report: Report = silent,
+    **about: str | None,
 ) -> Evaluation:
     """Score a method on one half of a benchmark, in the folder `out`.
 
     `method` is a name, as of `pcii.evaluate`. Without `budgets` it is scored at all light that there is. Rows
-    that are in the folder already are kept, as by `evaluate`. `about` are further members of submission.json.
-    Raises `InputError` for a method that is not
-    there, for budgets that no dataset has, and as `evaluate` does.
+    that are in the folder already are kept, as by `evaluate`. `about` are further members of
+    submission.json. Raises `InputError` for a method that is not there, for budgets that no dataset has, and
+    as `evaluate` does.
     """
     named = named_method(method)
     requested = {str(Light.parse(each)) for each in budgets}

@@ -125,10 +125,10 @@ def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
     def start(*arguments: str) -> subprocess.Popen[str]:
         # What a shell starts in the background ignores Ctrl-C, and so does all that this starts.
-        listens = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+        listen = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
         pipes: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
         command = [sys.executable, *arguments]
-        options = pipes | {"start_new_session": True, "preexec_fn": listens}
+        options = pipes | {"start_new_session": True, "preexec_fn": listen}
         processes.append(subprocess.Popen(command, env=environment, **options))
         return processes[-1]
 

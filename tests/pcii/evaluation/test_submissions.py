@@ -115,7 +115,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     folder, out = tmp_path / "submissions", tmp_path / "page.html"
     shutil.copytree(scored.folder, folder / "theirs")
     about = {"authors": "B. C.", "url": None, "trained_on": "drawn scenes"}
-    run_method("depth:posterior", data, folder / "ours", about=about)
+    run_method("depth:posterior", data, folder / "ours", **about)
     edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "a; b')(folder / "ours")
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()
