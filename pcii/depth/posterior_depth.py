@@ -297,7 +297,8 @@ def _halves_agree(
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
     Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
-    `where` (h, w) bool are decided, which saves the sums over the windows around all others.
+    `where` (h, w) bool are decided, which saves the sums over the windows around all others. On small films,
+    whose blocks are small, so are the cells: of what is small there are enough of them.
     """
     every_other, cell_px = planes.take(slice(None, None, 2)), min(2 * block_px, CELL_PX)
     i, j = (

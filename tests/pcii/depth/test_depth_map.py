@@ -59,7 +59,8 @@ def test_things_of_eighteen_pixels_have_a_depth_however_much_light_there_is(phot
     i, j = np.indices((side, side)) - (side - 1) / 2
     disc = (i**2 + j**2 < (side / 2) ** 2)[..., None] * blocky_texture(rng, side, side)
     discs = [(36, 6), (75, 7)]  # first row and column, disparity
-    rates = sum(patch_views(disc, corner, corner, disparity, grid) for corner, disparity in discs)
+    views = [patch_views(disc, corner, corner, disparity, grid) for corner, disparity in discs]
+    rates = np.sum(views, axis=0)
     # Of the light of three colours a pixel takes one.
     light = bayer_photons(3 * photons_per_view * grid.view_count / rates.sum() * rates, "GRBG", seed=1)
     depth = estimate_depth(PhotonCounts.from_dense(light, grid, cfa="GRBG"), (1 / 9, 1 / 3))
