@@ -297,17 +297,18 @@ def _halves_agree(
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
     Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
-    `where` (h, w) bool are decided, which saves the sums over the windows around all others.
+    `where` (h, w) bool are decided, which saves the sums over the windows around all others. On small films,
+    whose blocks are small, so are the cells: of what is small there are enough of them.
     """
-    every_other = planes.take(slice(None, None, 2))
+    every_other, cell_px = planes.take(slice(None, None, 2)), min(2 * block_px, CELL_PX)
     i, j = (
-        np.minimum(np.arange(-(-size // CELL_PX)) * CELL_PX // block_px, blocks - 1)
+        np.minimum(np.arange(-(-size // cell_px)) * cell_px // block_px, blocks - 1)
         for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)
     )
     plane = best[np.ix_(i, j)] // 2
     is_wanted = np.zeros(plane.shape, bool)
-    i, j = (index * block_px // CELL_PX for index in np.nonzero(where))
+    i, j = (index * block_px // cell_px for index in np.nonzero(where))
     is_wanted[i, j] = True
-    agree = halves_of(data, every_other, out_of_focus=True).agree(plane, is_wanted)
-    agree = on_pixels(agree, CELL_PX, data.grid.shape_HW)
+    halves = halves_of(data, every_other, cell_px=cell_px, out_of_focus=True)
+    agree = on_pixels(halves.agree(plane, is_wanted), cell_px, data.grid.shape_HW)
     return agree[::block_px, ::block_px]

@@ -38,7 +38,7 @@ from pcii.types.photon_counts import PhotonCounts
 FALSE_RATE = 1e-3
 """Largest share of pure noise in which the halves may seem to agree."""
 BLOCKS_CELLS = (1, 2, 4, 8)
-"""Sides of the blocks that are compared, in cells: 4 to 32 px."""
+"""Sides of the blocks that are compared, in cells: 4 to 32 px, of small films 2 to 16 px."""
 OUT_OF_FOCUS_BLOCKS = 3
 """Change of total disparity, in blocks, to a plane out of focus: a block's difference from its neighbours is
 averaged away by a blur as wide as all of them."""
@@ -181,10 +181,13 @@ def least_agreement(planes: int) -> float:
     return float(np.sqrt(2 * np.log(planes / FALSE_RATE)))
 
 
-def halves_of(data: PhotonCounts | Views, planes: FocalPlanes, *, out_of_focus: bool = False) -> Halves:
+def halves_of(
+    data: PhotonCounts | Views, planes: FocalPlanes, *, cell_px: int = CELL_PX, out_of_focus: bool = False
+) -> Halves:
     """How well the halves of the cameras agree at these planes and outside their range.
 
-    With `out_of_focus` also at planes nearer and farther than each, which `Halves.agree` needs.
+    With `out_of_focus` also at planes nearer and farther than each, which `Halves.agree` needs. `cell_px` is
+    the side of the cells, an even number; a thing is noticed if it has some six cells across.
     """
     own_px = planes.total_disparity_px
     nearest, farthest = own_px.max(), own_px.min()
@@ -193,13 +196,13 @@ def halves_of(data: PhotonCounts | Views, planes: FocalPlanes, *, out_of_focus: 
     behind_px = farthest - away_px
     outside_px = np.concatenate([np.maximum(behind_px[behind_px > -OUTSIDE_STEP_PX], 0), nearest + away_px])
     groups_px = [
-        (own_px, outside_px, *(_out_of_focus_px(own_px, side) if out_of_focus else ()))
+        (own_px, outside_px, *(_out_of_focus_px(own_px, side * cell_px) if out_of_focus else ()))
         for side in BLOCKS_CELLS
     ]
     total_px = np.unique(np.concatenate([px for groups in groups_px for px in groups]))
     half = np.add.outer(np.arange(data.grid.rows), np.arange(data.grid.cols)) % 2
     weights = np.stack([half == 0, half == 1]).astype(np.float64)
-    sums, samples = camera_sums(data, whole_shifts_px(data.grid, total_px), weights, CELL_PX)
+    sums, samples = camera_sums(data, whole_shifts_px(data.grid, total_px), weights, cell_px)
     halves: list[list[Products]] = []
     for side, groups in zip(BLOCKS_CELLS, groups_px, strict=True):
         used, places = np.unique(np.searchsorted(total_px, np.concatenate(groups)), return_inverse=True)
@@ -209,10 +212,10 @@ def halves_of(data: PhotonCounts | Views, planes: FocalPlanes, *, out_of_focus: 
     return Halves(*zip(*halves, strict=True))
 
 
-def _out_of_focus_px(own_px: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Total disparities (Z,) nearer and farther than those of the planes, for blocks of `side` cells."""
+def _out_of_focus_px(own_px: np.ndarray, block_px: int) -> tuple[np.ndarray, np.ndarray]:
+    """Total disparities (Z,) nearer and farther than those of the planes, for blocks of `block_px`."""
     # They need not be exact: rounded, those of many planes are the same.
-    step_px, away_px = side * CELL_PX / 2, OUT_OF_FOCUS_BLOCKS * side * CELL_PX
+    step_px, away_px = block_px / 2, OUT_OF_FOCUS_BLOCKS * block_px
     nearer, farther = (step_px * np.round((own_px + away) / step_px) for away in (away_px, -away_px))
     return nearer, farther
 

@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 from property_settings import mostly_slow
-from twins import bayer_photons, blocky_texture, even_light, opaque_views, photons_of, unit_grid
+from twins import bayer_photons, blocky_texture, even_light, opaque_views, patch_views, photons_of, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.depth.methods import estimate_depth
@@ -50,6 +50,24 @@ def test_depths_between_planes_are_distinguished(two_squares, beyond):
     # planes beside them differ. Without the parabola it would be 0.7 or 1, with its sign reversed more.
     for plane in (0, 1):
         assert np.median(disparity_errors_px(depth, two_squares, plane)) < 0.5
+
+
+@pytest.mark.parametrize("photons_per_view", [1e3, 1e5])
+def test_things_of_eighteen_pixels_have_a_depth_however_much_light_there_is(photons_per_view: float) -> None:
+    # They are 4.5 cells of 4 px across, in which the halves of the cameras cannot agree enough.
+    grid, rng, side = unit_grid(5, 5, 128, 128), np.random.default_rng(3), 18
+    i, j = np.indices((side, side)) - (side - 1) / 2
+    disc = (i**2 + j**2 < (side / 2) ** 2)[..., None] * blocky_texture(rng, side, side)
+    discs = [(36, 6), (75, 7)]  # first row and column, disparity
+    views = [patch_views(disc, corner, corner, disparity, grid) for corner, disparity in discs]
+    rates = np.sum(views, axis=0)
+    # Of the light of three colours a pixel takes one.
+    light = bayer_photons(3 * photons_per_view * grid.view_count / rates.sum() * rates, "GRBG", seed=1)
+    depth = estimate_depth(PhotonCounts.from_dense(light, grid, cfa="GRBG"), (1 / 9, 1 / 3))
+    for corner, disparity in discs:
+        z_mm = depth.z_mm[corner : corner + side, corner : corner + side][disc[..., 0] > 0]
+        assert np.isfinite(z_mm).mean() > 0.9
+        assert np.nanmedian(np.abs(4 / z_mm - 4 * disparity)) < 0.5  # four steps between five cameras
 
 
 def test_cameras_in_the_wrong_order_do_not_pass(two_squares):
