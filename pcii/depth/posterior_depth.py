@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
+from pcii.depth.network_inputs import CELL_SIDE_BLOCKS, NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.cells import CELL_PX
@@ -297,10 +297,10 @@ def _halves_agree(
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
     Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
-    `where` (h, w) bool are decided, which saves the sums over the windows around all others. On small films,
-    whose blocks are small, so are the cells: of what is small there are enough of them.
+    `where` (h, w) bool are decided, which saves the sums over the windows around all others. Cells are as
+    small as the network's, so that a small thing on a small film has enough of them.
     """
-    every_other, cell_px = planes.take(slice(None, None, 2)), min(2 * block_px, CELL_PX)
+    every_other, cell_px = planes.take(slice(None, None, 2)), min(CELL_SIDE_BLOCKS * block_px, CELL_PX)
     i, j = (
         np.minimum(np.arange(-(-size // cell_px)) * cell_px // block_px, blocks - 1)
         for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)

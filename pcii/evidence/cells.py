@@ -1,7 +1,7 @@
 """The coarse grid in which halves of the cameras are compared."""
 
 CELL_PX = 4
-"""Cells of 4 x 4 pixels: the smallest blocks that are compared."""
+"""Cells of 4 x 4 pixels, the smallest blocks that are compared; small films have smaller ones."""
 BLOCK_PX = 2
 """Voxels of 2 x 2 pixels, each of which every Bayer colour covers equally for any shifts.
 

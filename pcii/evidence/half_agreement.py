@@ -187,7 +187,7 @@ def halves_of(
     """How well the halves of the cameras agree at these planes and outside their range.
 
     With `out_of_focus` also at planes nearer and farther than each, which `Halves.agree` needs. `cell_px` is
-    the side of the cells, an even number; a thing is noticed if it has some six cells across.
+    the side of the cells, a multiple of `BLOCK_PX`; a thing with texture needs some six cells across.
     """
     own_px = planes.total_disparity_px
     nearest, farthest = own_px.max(), own_px.min()
