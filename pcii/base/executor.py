@@ -145,7 +145,7 @@ def _end_with_starter() -> None:
 def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generator[tuple[int, Any]]:
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
         from distributed.protocol.pickle import dumps  # functions of notebooks too
     except ImportError:
         install = "pip install '.[cluster]'"
