@@ -12,7 +12,7 @@ from pcii.types.arrays import Drawn, read_only
 from pcii.types.bayer import check_cfa, colours_and_samples
 from pcii.types.camera_grid import CameraGrid
 
-MOST_BYTES = 1 << 32
+MOST_BYTES = 1 << 31
 """Of views that are read from disk once, to be used for many planes."""
 
 
