@@ -145,7 +145,7 @@ def _end_with_starter() -> None:
 def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generator[tuple[int, Any]]:
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
         from distributed.protocol.pickle import dumps  # functions of notebooks too
     except ImportError:
         install = "pip install '.[cluster]'"
@@ -171,7 +171,8 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
                 yield by_future.pop(future), future.result()
         except Exception as fault:
             # Dask raises various exceptions when its scheduler ends, some before its client knows of it.
-            if client.status != "running" or isinstance(fault, CancelledError | CommClosedError | KilledWorker):
+            of_dask = CancelledError, CommClosedError, KilledWorker
+            if client.status != "running" or isinstance(fault, of_dask):
                 lost = f"{address}: the Dask scheduler has ended or is out of reach, or its workers died"
                 raise WorkerLostError(f"{lost}; {GOES_ON}") from fault
             raise

@@ -132,6 +132,7 @@ def _swept(
     A measure is of cells of `side` x `side` pixels. Sections, which have these `options`, are made of a few
     planes at a time.
     """
+    data = data.in_memory() if isinstance(data, Views) else data
     planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
     nothing = np.full([-(-size // side) for size in data.grid.shape_HW], -np.inf)
     best, nearby = np.zeros(nothing.shape, np.int64), np.stack([nothing] * 3)

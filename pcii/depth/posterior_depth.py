@@ -92,8 +92,7 @@ class PosteriorDepth:
     ) -> DepthPosterior:
         """The posterior of planes through the range, if any, and around the planes at `z_mm` (R,); masks of
         these."""
-        if isinstance(data, PhotonCounts):
-            data = without_hot_pixels(data)
+        data = without_hot_pixels(data) if isinstance(data, PhotonCounts) else data.in_memory()
         z_mm, order = np.unique(z_mm, return_inverse=True)
         planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
         coarse_px, block_px = self._blocks_px(planes)

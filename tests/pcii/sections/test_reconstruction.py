@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import blocky_texture, section_twin, unit_grid
 
+import pcii
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.bayer import PATTERNS, mosaic
 from pcii.types.camera_grid import CameraGrid
@@ -130,9 +131,9 @@ def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, parallax, sh
         assert (sections.estimate[2] != pattern)[sections.coverage[2] > 1].mean() > 0.9
 
 
-def test_views_on_disk_are_read_once_however_many_planes():
-    grid = unit_grid(2, 3, 4, 4)
-    pixels = blocky_texture(np.random.default_rng(0), 4, 4)
+def test_views_on_disk_are_read_once_however_many_planes(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = unit_grid(2, 3, 16, 16)
+    pixels = blocky_texture(np.random.default_rng(0), 16, 16)
     reads: list[tuple[int, int]] = []
 
     class Reader:
@@ -142,9 +143,17 @@ def test_views_on_disk_are_read_once_however_many_planes():
             reads.append(index)
             return pixels
 
-    sections = reconstruct(Views(Reader(), grid), [1.0, 2.0, 4.0])
-    assert sorted(reads) == [(k, l) for k in range(2) for l in range(3)]
-    everything = np.broadcast_to(pixels, (*grid.shape_KLHW, 3))
-    np.testing.assert_array_equal(
-        sections.counts, reconstruct(Views(everything, grid), [1.0, 2.0, 4.0]).counts
-    )
+    on_disk, everything = Views(Reader(), grid), Views(np.tile(pixels, (2, 3, 1, 1, 1)), grid)
+    cameras = [(k, l) for k in range(2) for l in range(3)]
+    sections = reconstruct(on_disk, [1.0, 2.0, 4.0])
+    assert sorted(reads) == cameras
+    np.testing.assert_array_equal(sections.counts, reconstruct(everything, [1.0, 2.0, 4.0]).counts)
+
+    reads.clear()
+    depth = pcii.estimate_depth(on_disk, (0.25, 2.0))
+    assert sorted(reads) == cameras
+    monkeypatch.setattr("pcii.types.images.MOST_BYTES", 0)  # too many for the memory
+    again = pcii.estimate_depth(on_disk, (0.25, 2.0))
+    assert len(reads) > 10 * len(cameras)
+    for own in (again, pcii.estimate_depth(everything, (0.25, 2.0))):
+        np.testing.assert_allclose(depth.z_mm, own.z_mm, rtol=1e-6)
