@@ -18,6 +18,7 @@ import numpy as np
 from pcii.depth.depth_planes import peak_depth_mm
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.sections.demosaicing import demosaic
+from pcii.sections.dense_sections import in_memory
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.estimates import DepthMap
 from pcii.types.focal_planes import FocalPlanes
@@ -132,7 +133,7 @@ def _swept(
     A measure is of cells of `side` x `side` pixels. Sections, which have these `options`, are made of a few
     planes at a time.
     """
-    data = data.in_memory() if isinstance(data, Views) else data
+    data = in_memory(data) if isinstance(data, Views) else data
     planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
     nothing = np.full([-(-size // side) for size in data.grid.shape_HW], -np.inf)
     best, nearby = np.zeros(nothing.shape, np.int64), np.stack([nothing] * 3)

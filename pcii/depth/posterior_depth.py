@@ -19,6 +19,7 @@ from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
+from pcii.sections.dense_sections import in_memory
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
@@ -92,7 +93,7 @@ class PosteriorDepth:
     ) -> DepthPosterior:
         """The posterior of planes through the range, if any, and around the planes at `z_mm` (R,); masks of
         these."""
-        data = without_hot_pixels(data) if isinstance(data, PhotonCounts) else data.in_memory()
+        data = without_hot_pixels(data) if isinstance(data, PhotonCounts) else in_memory(data)
         z_mm, order = np.unique(z_mm, return_inverse=True)
         planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
         coarse_px, block_px = self._blocks_px(planes)

@@ -7,8 +7,10 @@ from the first sample, in double precision, whose relative error is 1e-6 where t
 deviations.
 """
 
+import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,8 @@ from pcii.types.section_stack import Shifts
 
 BATCH = 8
 """Views that are read from disk at a time; as many are added meanwhile."""
+MOST_BYTES = 1 << 31
+"""Of views that are read from disk once, to be used for many sections."""
 
 
 def sum_views(
@@ -34,7 +38,7 @@ def sum_views(
     """
     from pcii.sections import kernels
 
-    kind, images = _dtype(data), _in_memory(data)
+    kind, images = _dtype(data), _as_one_array(data)
     running = (_RunningSums(data, focal_planes.take([p]), shifts, variance) for p in range(len(focal_planes)))
     if images is not None:  # plane by plane, so that the running sums of one are in memory
         _check_finite(data, all(kernels.are_finite(images)))
@@ -188,12 +192,23 @@ def _dtype(data: Views) -> np.dtype:
     return np.dtype(np.float32) if kind in (np.float16, np.float32) else np.dtype(np.float64)
 
 
-def _in_memory(data: Views) -> np.ndarray | None:
+def _as_one_array(data: Views) -> np.ndarray | None:
     """All images (V, H, N) if they are a contiguous array in memory of the type of the sums, else None."""
     radiance = data.radiance
     if isinstance(radiance, np.ndarray) and radiance.dtype == _dtype(data) and radiance.flags.c_contiguous:
         return radiance.reshape(data.grid.view_count, data.grid.height, -1)
     return None
+
+
+def in_memory(data: Views) -> Views:
+    """The same views, read once, if they take `MOST_BYTES` at most; else they are read again at each use."""
+    kind, shape = _dtype(data), data.radiance.shape
+    if _as_one_array(data) is not None or math.prod(shape) * kind.itemsize > MOST_BYTES:
+        return data
+    images = np.empty((data.grid.view_count, data.grid.height, shape[3] * shape[4]), kind)
+    for views, batch in _batches(data):
+        images[views] = batch
+    return replace(data, radiance=images.reshape(shape))
 
 
 def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:

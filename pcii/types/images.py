@@ -1,7 +1,6 @@
 """Elemental images: the radiance of every view."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,9 +10,6 @@ from pcii.base.short_form import times
 from pcii.types.arrays import Drawn, read_only
 from pcii.types.bayer import check_cfa, colours_and_samples
 from pcii.types.camera_grid import CameraGrid
-
-MOST_BYTES = 1 << 31
-"""Of views that are read from disk once, to be used for many planes."""
 
 
 class ArrayLike5D(Protocol):
@@ -80,21 +76,6 @@ class Views(Drawn):
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
         return image
-
-    def in_memory(self) -> "Views":
-        """These views with their radiance as an array, read once, if it takes `MOST_BYTES` at most.
-
-        Else they are left as they are, and read again at each use.
-        """
-        if isinstance(self.radiance, np.ndarray):
-            return self
-        dtype = np.dtype(getattr(self.radiance, "dtype", np.float64))
-        if math.prod(self.radiance.shape) * dtype.itemsize > MOST_BYTES:
-            return self
-        radiance = np.empty(self.radiance.shape, dtype)
-        for k, l in np.ndindex(self.grid.rows, self.grid.cols):
-            radiance[k, l] = self.radiance[k, l]
-        return replace(self, radiance=radiance)
 
 
 def binary_scale(views: Views) -> float:

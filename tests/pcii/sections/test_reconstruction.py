@@ -152,7 +152,7 @@ def test_views_on_disk_are_read_once_however_many_planes(monkeypatch: pytest.Mon
     reads.clear()
     depth = pcii.estimate_depth(on_disk, (0.25, 2.0))
     assert sorted(reads) == cameras
-    monkeypatch.setattr("pcii.types.images.MOST_BYTES", 0)  # too many for the memory
+    monkeypatch.setattr("pcii.sections.dense_sections.MOST_BYTES", 0)  # too many for the memory
     again = pcii.estimate_depth(on_disk, (0.25, 2.0))
     assert len(reads) > 10 * len(cameras)
     for own in (again, pcii.estimate_depth(everything, (0.25, 2.0))):
