@@ -97,17 +97,14 @@ two or four of 1 × 2 and 2 × 2 are as sharp as the detail itself, and meet tho
 baseline is longer than the distance between details.
 
 **A line of cameras is blind to edges along it.** They do not move (the aperture problem), and they stay
-sharp at every plane. With other arrays depth has an answer only where the structure that two halves of the
-cameras agree on is sharper in focus than out of focus ([half agreement](theory.md#half-agreement)). Of a
-line, and of any array in very little light, below 40 photons of all views in 8 × 8 px, the whole film is
-asked instead, whether the halves agree on any structure. What that leaves without an answer shows below: the
+sharp at every plane, behind infinity as well, so that they [show no depth](theory.md#where-a-depth-is-shown). What is left without an
+answer, of lines and of other arrays, shows below: the
 column *seen as a surface* counts what the network takes for one, and the last column what would be right if
 all were answered.
 
 {abstention}
 
-**Two cameras** are one in each half, so that depth and the masks of the network work from two views on. A
-single view is refused. The three steps need 8 samples to reject a point by its variance, so that with fewer
+**Two cameras** are enough for depth and the masks of the network. A single view is refused. The three steps need 8 samples to reject a point by its variance, so that with fewer
 cameras outlines and entropy decide alone.
 
 **Dead cameras.** A grid has no cameras that are left out: `pcii import` refuses a folder in which views are
@@ -115,10 +112,7 @@ missing, and a camera that does not work is one without photons. Its pixels coun
 So `sections.estimate` is lower by the share of dead cameras, by {few_dead} with 5 of 100 and {cross_dead}
 in the cross; masks and depth compare planes, which are all lower alike, so that five of 100 change little.
 In light that is only just enough they may cost all answers, as in the room at 1000 photons. The three steps
-take the spread among views for defocus, and lose much of two objects with the cross at 1000 photons. The
-halves of the cameras are the two colours of a chessboard: if all cameras that work are on one colour, one
-half has no photons, and depth and `posterior` answer nothing. Every second row
-and column of such an array are a full grid, which works.
+take the spread among views for defocus, and lose much of two objects with the cross at 1000 photons.
 
 ## What is not modelled
 

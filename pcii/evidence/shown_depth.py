@@ -91,7 +91,7 @@ def _evidence_at(
 ) -> np.ndarray:
     """Evidence (Z, h, w) at planes of any total disparity (Z,): of 0, infinitely far, and below it."""
     # Cameras with shear have planes in front of infinity wherever their films are shifted to.
-    shear_px = 1.0 - total_px.min()
+    shear_px = 1.0 + np.abs(total_px).max()
     planes = FocalPlanes.at_total_disparity(_with_shear(data.grid, shear_px), total_px + shear_px)
     return evidence_of_texture(replace(data, grid=planes.grid), planes, block_px, model).nats
 
