@@ -37,8 +37,9 @@ class ShownDepth:
     least_gain: float = 1.0
     most_gain: float = 4.0
     """Ends of what it is to exceed, in nats per block of the window's standard deviation."""
-    outside_step_blocks: float = 4.0
-    """Total disparity between planes outside the range, the first of which is half as far from its end."""
+    step_blocks: float = 4.0
+    """Total disparity, in blocks, between planes outside the range, the first of which is half as far from
+    its end, and the least of planes behind infinity."""
 
     def __call__(
         self,
@@ -54,10 +55,12 @@ class ShownDepth:
         """
         from scipy.ndimage import maximum_filter
 
-        own_px = planes.total_disparity_px
+        own_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        # Less than a step behind infinity a surface with little disparity would be sharp still.
+        behind_px = -np.unique(np.maximum(own_px, step_px))
         behind, outside = (
             _evidence_at(total_px, data, block_px, model)
-            for total_px in (-own_px, self._outside_px(own_px, block_px))
+            for total_px in (behind_px, _outside_px(own_px, step_px))
         )
         (h, w), side = nats.shape[1:], 1
         shown, squares = np.zeros((h, w), bool), np.mean(behind**2, axis=0)
@@ -68,7 +71,7 @@ class ShownDepth:
                 block_sums(part, 2, np.float32) for part in (nats, behind, outside, squares)
             )
             # What a single camera has seen is so far from its place, in cells, at the plane behind infinity.
-            reach = 2 * int(np.ceil(own_px.max() / block_px / side)) + 1
+            reach = 2 * int(np.ceil(np.abs(behind_px).max() / block_px / side)) + 1
             sigma_cells = self.smallest_blocks / 2
             noise = np.sqrt(maximum_filter(_in_window(squares, sigma_cells, power=2), reach))
             blocks = sigma_cells * side
@@ -78,12 +81,13 @@ class ShownDepth:
             shown |= on_pixels(is_shown, side, (h, w))
         return shown
 
-    def _outside_px(self, own_px: np.ndarray, block_px: int) -> np.ndarray:
-        """Total disparities outside the range, from infinity to as far in front of it as that is behind."""
-        step_px, nearest_px = self.outside_step_blocks * block_px, own_px.max()
-        away_px = step_px * (np.arange(np.ceil(nearest_px / step_px)) + 0.5)
-        behind_px = own_px.min() - away_px
-        return np.concatenate([behind_px[behind_px > -step_px].clip(min=0), nearest_px + away_px])
+
+def _outside_px(own_px: np.ndarray, step_px: float) -> np.ndarray:
+    """Total disparities outside the range, from infinity to as far in front of it as that is behind."""
+    nearest_px = own_px.max()
+    away_px = step_px * (np.arange(np.ceil(nearest_px / step_px)) + 0.5)
+    behind_px = own_px.min() - away_px
+    return np.concatenate([behind_px[behind_px > -step_px].clip(min=0), nearest_px + away_px])
 
 
 def _evidence_at(
