@@ -47,7 +47,7 @@ def variants() -> Iterator[tuple[str, PosteriorDepth]]:
     """The method as it is, and with each of its numbers halved and doubled."""
     default = PosteriorDepth()
     yield "as it is", default
-    for part in ("model", "prior", None):
+    for part in ("model", "prior", "shown", None):
         owner: Any = getattr(default, part) if part else default
         for name, value in vars(owner).items():
             for factor in (0.5, 2) if isinstance(value, int | float) else ():

@@ -1,8 +1,8 @@
 """Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
 
 Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
-largest value. So a connected region that may be a surface has an answer if two halves of the cameras show the
-same structure in a part of it (`pcii.evidence.half_agreement`).
+largest value. So a connected region that may be a surface has an answer if a depth is shown in a part of it
+(`pcii.evidence.shown_depth`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.depth.network_inputs import CELL_SIDE_BLOCKS, NetworkInputs, hint_of, inputs_of
+from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
-from pcii.evidence.cells import CELL_PX
-from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
+from pcii.evidence.shown_depth import ShownDepth
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
@@ -39,10 +38,13 @@ NO_DEPTHS = np.zeros(0)
 
 class FilmOutputs(NamedTuple):
     """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
-    requested planes (R, h, w). And the photons of `TextureEvidence` (Z, h / 4, w / 4)."""
+    requested planes (R, h, w). Of `TextureEvidence` the photons (Z, h / 4, w / 4), and `nats` at the planes
+    that it was made for."""
 
     maps: tuple[np.ndarray, np.ndarray, np.ndarray]
     photons: np.ndarray
+    planes: FocalPlanes
+    nats: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class PosteriorDepth:
 
     model: TextureModel = field(default_factory=TextureModel)
     prior: SurfacePrior = field(default_factory=SurfacePrior)
+    shown: ShownDepth = field(default_factory=ShownDepth)
     step_px: float = 1.0
     """Total disparity between planes of the posterior."""
     block_px: int = 2
@@ -67,17 +70,8 @@ class PosteriorDepth:
 
     max_empty: float = 0.5
     """Largest probability of no surface where one is answered."""
-    clear_photons: float = 40.0
-    """Mean number of photons of all views in 8 x 8 px below which the whole film is tested, since no part of
-    it is clear enough."""
-    min_film_agreement: float = 4.0
-    """Smallest t of a whole film that has answers. Some seven of 1000 films of noise exceed it."""
-    min_line_agreement: float = 6.0
-    """The same of cameras in a line, where shading does not blur either. Of 80 films without depth the
-    largest t is 5.4; the paper's scene has 7 to 10 from 300 photons per view on."""
-    min_agreed_share: float = 0.02
-    """Smallest share of a connected region in which two halves of the cameras show the same structure. A
-    smaller one would let noise pass, of which they agree in 1 cell of 1000."""
+    least_shown: float = 0.02
+    """Smallest share of a connected region in which a depth is shown, if all of it is answered."""
 
     def __call__(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float], z_mm: np.ndarray = NO_DEPTHS
@@ -97,7 +91,7 @@ class PosteriorDepth:
         z_mm, order = np.unique(z_mm, return_inverse=True)
         planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
         coarse_px, block_px = self._blocks_px(planes)
-        network = self._film_outputs(data, planes, block_px, z_mm)
+        network = coarse = self._film_outputs(data, planes, block_px, z_mm)
         if coarse_px > block_px:
             coarse = self._film_outputs(data, planes, coarse_px, z_mm)
             for mean, other in zip(network.maps, coarse.maps, strict=True):
@@ -107,7 +101,12 @@ class PosteriorDepth:
         probability, nothing, in_focus = network.maps
         maps = probability, nothing[0], block_px, in_focus[order]
         posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing[0].shape, bool))
-        return replace(posterior, is_detected=self._detected(data, posterior, network.photons))
+        side_px = max(coarse_px, self.block_px)
+        shown = self.shown(data, coarse.planes, coarse.nats, side_px, self.model)
+        shown = on_pixels(shown, side_px, data.grid.shape_HW)[::block_px, ::block_px]
+        is_radiance = isinstance(data, Views)
+        is_detected = self._detected(posterior, network.photons, shown, is_radiance=is_radiance)
+        return replace(posterior, is_detected=is_detected)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.
@@ -133,6 +132,7 @@ class PosteriorDepth:
         if step_px != self.step_px:
             own_planes = FocalPlanes.between(grid, planes.z_mm.min(), planes.z_mm.max(), step_px)
         evidence = evidence_of_texture(data, own_planes, max(block_px, self.block_px), self.model)
+        nats = evidence.nats
         if block_px < self.block_px:
             evidence = _in_four(evidence, grid.shape_HW)
         h, w = evidence.nats.shape[1:]
@@ -150,30 +150,24 @@ class PosteriorDepth:
             nothing[:, *part] = outputs.no_surface[:h, :w]
             in_focus[:, *part] = outputs.in_focus[:, :h, :w]
         nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
-        return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest])
+        return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest], own_planes, nats)
 
     def _detected(
-        self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray
+        self, posterior: DepthPosterior, photons: np.ndarray, shown: np.ndarray, *, is_radiance: bool
     ) -> np.ndarray:
-        """Where a surface is detected (h, w) bool."""
+        """Where a surface is detected (h, w) bool, from where a depth is shown (h, w)."""
         from scipy.ndimage import label
 
         plane, _, _ = posterior.most_probable()
         is_possible = self._has_photons(photons, plane, posterior.block_px)
-        if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows none
+        if not is_radiance:  # the network has not learned where radiance shows no surface
             is_possible &= posterior.no_surface <= self.max_empty
-            is_clear = photons.mean() >= self.clear_photons * (posterior.block_px / self.block_px) ** 2
-            # Regions are compared by blur, and edges along a line of cameras blur at no plane.
-            is_line = min(data.grid.rows, data.grid.cols) == 1
-            if is_line or not is_clear:
-                least = self.min_line_agreement if is_line else self.min_film_agreement
-                return is_possible & (_agreement_of_film(data, posterior.planes) >= least)
-        agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, is_possible) & is_possible
+        shown = shown & is_possible
         labelled: Any = label(is_possible)
         region = np.asarray(labelled[0]).ravel()
         cells = np.bincount(region).clip(min=1)
-        agreed_share = (np.bincount(region, agree.ravel()) / cells)[region].reshape(agree.shape)
-        return agree | is_possible & (agreed_share >= self.min_agreed_share)
+        shown_share = (np.bincount(region, shown.ravel()) / cells)[region].reshape(shown.shape)
+        return shown | is_possible & (shown_share >= self.least_shown)
 
     def network_inputs(
         self,
@@ -284,31 +278,3 @@ def _between_blocks(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     for axis in (0, 1):
         fine = convolve1d(fine, np.array([0.25, 0.5, 0.25]), axis, mode="nearest")
     return fine
-
-
-def _agreement_of_film(counts: PhotonCounts, planes: FocalPlanes) -> float:
-    """How well two halves of the cameras agree on structure anywhere on the film, as t."""
-    return halves_of(counts, planes.take(slice(None, None, 2))).agreement_of_film()
-
-
-def _halves_agree(
-    data: PhotonCounts | Views, planes: FocalPlanes, best: np.ndarray, block_px: int, where: np.ndarray
-) -> np.ndarray:
-    """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
-
-    Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
-    `where` (h, w) bool are decided, which saves the sums over the windows around all others. Cells are as
-    small as the network's, so that a small thing on a small film has enough of them.
-    """
-    every_other, cell_px = planes.take(slice(None, None, 2)), min(CELL_SIDE_BLOCKS * block_px, CELL_PX)
-    i, j = (
-        np.minimum(np.arange(-(-size // cell_px)) * cell_px // block_px, blocks - 1)
-        for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)
-    )
-    plane = best[np.ix_(i, j)] // 2
-    is_wanted = np.zeros(plane.shape, bool)
-    i, j = (index * block_px // cell_px for index in np.nonzero(where))
-    is_wanted[i, j] = True
-    halves = halves_of(data, every_other, cell_px=cell_px, out_of_focus=True)
-    agree = on_pixels(halves.agree(plane, is_wanted), cell_px, data.grid.shape_HW)
-    return agree[::block_px, ::block_px]

@@ -54,7 +54,6 @@ def test_depths_between_planes_are_distinguished(two_squares, beyond):
 
 @pytest.mark.parametrize("photons_per_view", [1e3, 1e5])
 def test_things_of_eighteen_pixels_have_a_depth_however_much_light_there_is(photons_per_view: float) -> None:
-    # They are 4.5 cells of 4 px across, in which the halves of the cameras cannot agree enough.
     grid, rng, side = unit_grid(5, 5, 128, 128), np.random.default_rng(3), 18
     i, j = np.indices((side, side)) - (side - 1) / 2
     disc = (i**2 + j**2 < (side / 2) ** 2)[..., None] * blocky_texture(rng, side, side)

@@ -1,0 +1,124 @@
+"""Where there is a depth to be seen at all: evidence that is lost behind infinity.
+
+What belongs to the films or to the light, and noise, is as sharp at a plane as at that of the opposite total
+disparity, behind infinity: hot pixels, vignetting, shading, views that differ in brightness. A surface is
+sharp in front of infinity alone. So a depth is shown where the evidence in a window, at its best plane,
+exceeds that of the planes behind infinity, and is no less than that of planes outside the range.
+
+Of noise a coefficient of an octave has evidence with a variance of 1/2 square nat at most. It counts
+4^-octave and stands for 4^octave blocks, so that the sum over many blocks has a variance of some 2/3 for each
+of them: in a Gaussian window of standard deviation s blocks, of weight 1 at its centre, a standard deviation
+of 1.4 s nats.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
+from pcii.imaging.blocks import block_sums, on_pixels
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+
+
+@dataclass(frozen=True)
+class ShownDepth:
+    """The test with its constants; docs/experiments/depth.md has what they change."""
+
+    windows: int = 4
+    """Gaussian windows, each twice as wide as the one before: wide ones are for little light."""
+    smallest_blocks: float = 4.0
+    """Standard deviation of the smallest window, in blocks."""
+    noise_sigmas: float = 12.0
+    """What the gain is to exceed, in standard deviations of the noise that planes behind infinity show."""
+    least_gain: float = 1.0
+    most_gain: float = 4.0
+    """Ends of what it is to exceed, in nats per block of the window's standard deviation."""
+    step_blocks: float = 4.0
+    """Total disparity, in blocks, between planes outside the range, the first of which is half as far from
+    its end, and the least of planes behind infinity."""
+
+    def __call__(
+        self,
+        data: PhotonCounts | Views,
+        planes: FocalPlanes,
+        nats: np.ndarray,
+        block_px: int,
+        model: TextureModel,
+    ) -> np.ndarray:
+        """Where (h, w) bool a depth is shown by the evidence (Z, h, w) of `data` at these planes.
+
+        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`.
+        """
+        from scipy.ndimage import maximum_filter
+
+        own_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        # Less than a step behind infinity a surface with little disparity would be sharp still.
+        behind_px = -np.unique(np.maximum(own_px, step_px))
+        behind, outside = (
+            _evidence_at(total_px, data, block_px, model)
+            for total_px in (behind_px, _outside_px(own_px, step_px))
+        )
+        (h, w), side = nats.shape[1:], 1
+        shown, squares = np.zeros((h, w), bool), np.mean(behind**2, axis=0)
+        for _ in range(self.windows):
+            # Each window has the same standard deviation in cells, which grow with it.
+            side *= 2
+            nats, behind, outside, squares = (
+                block_sums(part, 2, np.float32) for part in (nats, behind, outside, squares)
+            )
+            # What a single camera has seen is so far from its place, in cells, at the plane behind infinity.
+            reach = 2 * int(np.ceil(np.abs(behind_px).max() / block_px / side)) + 1
+            sigma_cells = self.smallest_blocks / 2
+            noise = np.sqrt(maximum_filter(_in_window(squares, sigma_cells, power=2), reach))
+            blocks = sigma_cells * side
+            least = np.clip(self.noise_sigmas * noise, self.least_gain * blocks, self.most_gain * blocks)
+            own, other, beside = (_best_in_window(part, sigma_cells) for part in (nats, behind, outside))
+            is_shown = (own - maximum_filter(other, reach) > least) & (own >= beside)
+            shown |= on_pixels(is_shown, side, (h, w))
+        return shown
+
+
+def _outside_px(own_px: np.ndarray, step_px: float) -> np.ndarray:
+    """Total disparities outside the range, from infinity to as far in front of it as that is behind."""
+    nearest_px = own_px.max()
+    away_px = step_px * (np.arange(np.ceil(nearest_px / step_px)) + 0.5)
+    behind_px = own_px.min() - away_px
+    return np.concatenate([behind_px[behind_px > -step_px].clip(min=0), nearest_px + away_px])
+
+
+def _evidence_at(
+    total_px: np.ndarray, data: PhotonCounts | Views, block_px: int, model: TextureModel
+) -> np.ndarray:
+    """Evidence (Z, h, w) at planes of any total disparity (Z,): of 0, infinitely far, and below it."""
+    # Cameras with shear have planes in front of infinity wherever their films are shifted to.
+    shear_px = 1.0 + np.abs(total_px).max()
+    planes = FocalPlanes.at_total_disparity(_with_shear(data.grid, shear_px), total_px + shear_px)
+    return evidence_of_texture(replace(data, grid=planes.grid), planes, block_px, model).nats
+
+
+def _with_shear(grid: CameraGrid, total_px: float) -> CameraGrid:
+    """The grid with a shear that is larger by the parallax of the plane of this total disparity."""
+    more_px = parallax_px(grid, depth_of_total_disparity_mm(grid, np.array(total_px)))
+    x, y = (float(own + more) for own, more in zip(grid.shear_px, more_px, strict=True))
+    return replace(grid, shear_px=(x, y))
+
+
+def _best_in_window(nats: np.ndarray, sigma: float) -> np.ndarray:
+    """The largest sum (h, w) of any plane in the window around each cell."""
+    from pcii.base.compiled_loops import each_in_threads
+
+    return np.max(each_in_threads(lambda z: _in_window(nats[z], sigma), range(len(nats))), axis=0)
+
+
+def _in_window(values: np.ndarray, sigma: float, power: int = 1) -> np.ndarray:
+    """Sums in a Gaussian window of weight 1 at its centre, the weights to a power."""
+    from scipy.ndimage import gaussian_filter
+
+    # A power of a Gaussian is a Gaussian.
+    own_sigma = sigma / np.sqrt(power)
+    sums = gaussian_filter(values, own_sigma, mode="constant")
+    return np.float32(2 * np.pi * own_sigma**2) * sums

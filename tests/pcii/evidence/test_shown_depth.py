@@ -1,0 +1,73 @@
+"""A depth is shown by a surface in the range, and by nothing that belongs to noise, films or light."""
+
+import numpy as np
+import pytest
+from property_settings import mostly_slow
+from twins import blocky_texture, even_light, patch_views, unit_grid
+
+from pcii.evidence.shown_depth import ShownDepth
+from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
+
+MODEL, BLOCK_PX, DISPARITIES_PX = TextureModel(), 2, (4.0, 4.5, 5.0, 5.5, 6.0)
+PATCH = np.s_[18:42, 26:50]  # blocks well inside the texture of `patch_of`
+
+
+def shown(counts: PhotonCounts) -> np.ndarray:
+    grid = counts.grid
+    steps = max(grid.rows, grid.cols) - 1
+    planes = FocalPlanes.at_total_disparity(grid, steps * np.array(DISPARITIES_PX))
+    nats = evidence_of_texture(counts, planes, BLOCK_PX, MODEL).nats
+    return ShownDepth()(counts, planes, nats, BLOCK_PX, MODEL)
+
+
+def patch_of(disparity_px: int, *, photons: float, shear_px: int = 0) -> PhotonCounts:
+    """A square with texture on a dark film of 5 x 7 cameras, as shear leaves it."""
+    rng = np.random.default_rng(0)
+    square = photons * blocky_texture(rng, 64, 64)
+    films = patch_views(square, 32, 48, disparity_px - shear_px, unit_grid(5, 7, 128, 160))
+    grid = unit_grid(5, 7, 128, 160, shear_px=(shear_px, shear_px))
+    return PhotonCounts.from_dense(rng.poisson(films[..., 0]), grid)
+
+
+@pytest.mark.parametrize("shear_px", [0, 5, 8])
+@pytest.mark.parametrize("photons", [0.05, 100.0])
+def test_a_surface_in_the_range_shows_its_depth(photons: float, shear_px: int) -> None:
+    assert shown(patch_of(5, photons=photons, shear_px=shear_px))[PATCH].mean() > 0.95
+
+
+def test_what_lies_outside_the_range_shows_no_depth_in_it() -> None:
+    # The textures at 0, of the films themselves, and at 8 are sharper there than in the range of 4 to 6.
+    for disparity_px in (0, 2, 8):
+        assert not shown(patch_of(disparity_px, photons=1.0)).any()
+
+
+def test_a_camera_alone_shows_no_depth() -> None:
+    # A texture in full light in one view and noise in the others.
+    grid, rng = unit_grid(3, 3, 96, 96), np.random.default_rng(1)
+    film = rng.poisson(0.5, grid.shape_KLHW)
+    film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
+    assert not shown(PhotonCounts.from_dense(film, grid)).any()
+
+
+def test_noise_that_all_cameras_share_is_a_surface_where_they_put_it() -> None:
+    # The planted fault: with the opposite order of cameras the same noise is none.
+    noise = np.random.default_rng(2).poisson(1.0, (200, 200, 1))
+    grid = unit_grid(3, 3, 128, 128)
+    film = patch_views(noise, -36, -36, 5, grid)[..., 0].astype(int)
+    assert shown(PhotonCounts.from_dense(film, grid)).mean() > 0.9
+    assert not shown(PhotonCounts.from_dense(film[::-1, ::-1], grid)).any()
+
+
+@pytest.mark.parametrize(
+    ("rate", "views"),
+    mostly_slow(
+        [(rate, views) for rate in (0.003, 0.1, 1.0, 1e4) for views in ((2, 1), (3, 4))],
+        quick=[(0.003, (3, 4)), (1.0, (2, 1))],
+    ),
+)
+def test_even_light_shows_no_depth(rate: float, views: tuple[int, int]) -> None:
+    grid: CameraGrid = unit_grid(*views, 64, 80)
+    assert not any(shown(even_light(grid, rate, seed)).any() for seed in range(10))
