@@ -16,7 +16,7 @@ from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.shown_depth import ShownDepth
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
-from pcii.imaging.blocks import on_pixels
+from pcii.imaging.blocks import on_pixels, window_sums
 from pcii.imaging.bright_regions import box_around
 from pcii.sections.dense_sections import in_memory
 from pcii.types.camera_grid import CameraGrid
@@ -211,10 +211,7 @@ class PosteriorDepth:
 
     def _photons_around(self, photons: np.ndarray, block_px: int) -> np.ndarray:
         """Photons (Z, h / 4, w / 4) in a Gaussian window of weight 1 at its centre."""
-        from scipy.ndimage import gaussian_filter
-
-        sigma = self.window_px / (block_px * CELL_BLOCKS)
-        return gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
+        return window_sums(photons, self.window_px / (block_px * CELL_BLOCKS))
 
 
 def _whole_range_mm(

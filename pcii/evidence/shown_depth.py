@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.imaging.blocks import block_sums, on_pixels
-from pcii.types.camera_grid import CameraGrid
+from pcii.imaging.blocks import block_sums, on_pixels, window_sums
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px
+from pcii.types.geometry import parallax_per_total
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -73,7 +72,8 @@ class ShownDepth:
             # What a single camera has seen is so far from its place, in cells, at the plane behind infinity.
             reach = 2 * int(np.ceil(np.abs(behind_px).max() / block_px / side)) + 1
             sigma_cells = self.smallest_blocks / 2
-            noise = np.sqrt(maximum_filter(_in_window(squares, sigma_cells, power=2), reach))
+            # The square of a Gaussian is one of 1 / sqrt(2) the width.
+            noise = np.sqrt(maximum_filter(window_sums(squares, sigma_cells / 2**0.5), reach))
             blocks = sigma_cells * side
             least = np.clip(self.noise_sigmas * noise, self.least_gain * blocks, self.most_gain * blocks)
             own, other, beside = (_best_in_window(part, sigma_cells) for part in (nats, behind, outside))
@@ -95,30 +95,15 @@ def _evidence_at(
 ) -> np.ndarray:
     """Evidence (Z, h, w) at planes of any total disparity (Z,): of 0, infinitely far, and below it."""
     # Cameras with shear have planes in front of infinity wherever their films are shifted to.
-    shear_px = 1.0 + np.abs(total_px).max()
-    planes = FocalPlanes.at_total_disparity(_with_shear(data.grid, shear_px), total_px + shear_px)
-    return evidence_of_texture(replace(data, grid=planes.grid), planes, block_px, model).nats
-
-
-def _with_shear(grid: CameraGrid, total_px: float) -> CameraGrid:
-    """The grid with a shear that is larger by the parallax of the plane of this total disparity."""
-    more_px = parallax_px(grid, depth_of_total_disparity_mm(grid, np.array(total_px)))
-    x, y = (float(own + more) for own, more in zip(grid.shear_px, more_px, strict=True))
-    return replace(grid, shear_px=(x, y))
+    more_px = 1.0 + np.abs(total_px).max()
+    x, y = (np.array(data.grid.shear_px) + more_px * parallax_per_total(data.grid)).tolist()
+    grid = replace(data.grid, shear_px=(x, y))
+    planes = FocalPlanes.at_total_disparity(grid, total_px + more_px)
+    return evidence_of_texture(replace(data, grid=grid), planes, block_px, model).nats
 
 
 def _best_in_window(nats: np.ndarray, sigma: float) -> np.ndarray:
     """The largest sum (h, w) of any plane in the window around each cell."""
     from pcii.base.compiled_loops import each_in_threads
 
-    return np.max(each_in_threads(lambda z: _in_window(nats[z], sigma), range(len(nats))), axis=0)
-
-
-def _in_window(values: np.ndarray, sigma: float, power: int = 1) -> np.ndarray:
-    """Sums in a Gaussian window of weight 1 at its centre, the weights to a power."""
-    from scipy.ndimage import gaussian_filter
-
-    # A power of a Gaussian is a Gaussian.
-    own_sigma = sigma / np.sqrt(power)
-    sums = gaussian_filter(values, own_sigma, mode="constant")
-    return np.float32(2 * np.pi * own_sigma**2) * sums
+    return np.max(each_in_threads(lambda z: window_sums(nats[z], sigma), range(len(nats))), axis=0)

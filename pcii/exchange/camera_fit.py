@@ -18,7 +18,7 @@ from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
 from pcii.imaging.blocks import block_sums, evenly_chosen
 from pcii.store.dataset_writer import check_depth_range
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px, total_disparity_px
+from pcii.types.geometry import depth_of_total_disparity_mm, parallax_per_total, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -107,7 +107,7 @@ def check_grid(
             rows, cols = best.flip_rows ^ (grids[best].rows > 1), best.flip_cols ^ (grids[best].cols > 1)
             return replace(fit, order=replace(best, flip_rows=rows, flip_cols=cols))
         least_px = float(shifts_px[np.searchsorted(mass.cumsum(), 0.02)])
-        x, y = 2 * max(-least_px, 0.0) * _per_total(grids[best])  # as far in front as it was behind
+        x, y = 2 * max(-least_px, 0.0) * parallax_per_total(grids[best])  # as far in front as it was behind
         return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
     if fit.order is not None:
         return fit
@@ -178,14 +178,9 @@ def _cells_of(images: Views | PhotonCounts, side: int) -> Callable[[int], np.nda
     return cells
 
 
-def _per_total(grid: CameraGrid) -> np.ndarray:
-    """Parallax (x, y) from camera to camera as a share of the total parallax of the longer axis."""
-    return np.array(parallax_px(grid, 1.0)) / total_disparity_px(grid, 1.0)
-
-
 def _still_px(grid: CameraGrid) -> float:
     """Total parallax of what stands still in all views, because they are shifted by the shear."""
-    return float(np.mean(np.array(grid.shear_px) / _per_total(grid)))
+    return float(np.mean(np.array(grid.shear_px) / parallax_per_total(grid)))
 
 
 def _sweep(
@@ -202,7 +197,8 @@ def _sweep(
     images = [cells(int(table[k, l])) for k in rows for l in cols]
     steps = np.array([(k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2) for k in rows for l in cols])
     total_px = shifts_px + _still_px(grid)
-    disparity = total_px[:, None] * _per_total(grid)[::-1] - np.array(grid.shear_px[::-1])  # down, right
+    per_total, shear_px = parallax_per_total(grid)[::-1], np.array(grid.shear_px[::-1])  # down, right
+    disparity = total_px[:, None] * per_total - shear_px
     moves = np.floor(disparity[:, None] * steps / side + 0.5).astype(int)  # (P, V, 2)
     h, w = images[0].shape
     fewest = max(2, MIN_SHARE * len(images))

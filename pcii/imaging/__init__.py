@@ -1,7 +1,7 @@
 """Image processing: blocks, bright regions, outlines, watersheds.
 
-blocks            Square blocks of pixels: sums over them, and their values on pixels again; some of many
-                  things.
+blocks            Square blocks of pixels: sums over them, and their values on pixels again; windows;
+                  some of many things.
 bright_regions    Bright regions of a section, with outlines along the strongest edges; operations on
                   masks.
 mask_outlines     Outlines of masks with subpixel accuracy, and their agreement.

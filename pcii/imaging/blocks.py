@@ -1,4 +1,4 @@
-"""Square blocks of pixels: sums over them, and their values on pixels again; some of many things."""
+"""Square blocks of pixels: sums over them, and their values on pixels again; windows; some of many things."""
 
 from collections.abc import Sequence
 
@@ -28,6 +28,14 @@ def sum_of(parts: Sequence[np.ndarray], dtype: type) -> np.ndarray:
     for part in parts[1:]:
         total += part
     return total
+
+
+def window_sums(values: np.ndarray, sigma: float) -> np.ndarray:
+    """Sums (..., h, w) in a Gaussian window around each place, of weight 1 at its centre."""
+    from scipy.ndimage import gaussian_filter
+
+    axes = values.ndim - 2, values.ndim - 1
+    return gaussian_filter(values, sigma, mode="constant", axes=axes) * (2 * np.pi * sigma**2)
 
 
 def on_pixels(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, TrueFocus
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import blur_half_extent_px, parallax_px, total_disparity_px
+from pcii.types.geometry import blur_half_extent_px, parallax_per_total, total_disparity_px
 from pcii.types.section_stack import Sections
 from pcii.types.truth import Truth
 
@@ -38,10 +38,9 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     >>> depth_bound_px(grid, photons=5000, gradient_squared=(0.01, 0.01)).__round__(3)
     0.313
     """
-    total = float(total_disparity_px(grid, 1.0))
-    if total == 0:
+    if total_disparity_px(grid, 1.0) == 0:
         return None
-    d_x, d_y = (float(d) / total for d in parallax_px(grid, 1.0))
+    d_x, d_y = parallax_per_total(grid)
     # Mean squares of the cameras' shifts per px of total disparity: 0.102 for 10 cameras along an axis.
     c_x, c_y = (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
     information = photons * (c_x * gradient_squared[0] + c_y * gradient_squared[1])

@@ -64,6 +64,11 @@ def shifts_to_centre_px(
     return rows, (np.arange(grid.cols) - (grid.cols - 1) / 2) * across[:, None]
 
 
+def parallax_per_total(grid: CameraGrid) -> np.ndarray:
+    """(horizontal, vertical) parallax from camera to camera as a share of the total disparity, (2,)."""
+    return np.array(parallax_px(grid, 1.0)) / total_disparity_px(grid, 1.0)
+
+
 def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
     """Half-extent in px of the blur of a point at z in the section at z0: total disparity's change / 2."""
     return np.abs(total_disparity_px(grid, z_mm) - total_disparity_px(grid, z0_mm)) / 2

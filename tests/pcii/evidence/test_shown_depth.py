@@ -7,7 +7,6 @@ from twins import blocky_texture, even_light, patch_views, unit_grid
 
 from pcii.evidence.shown_depth import ShownDepth
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 
@@ -16,9 +15,8 @@ PATCH = np.s_[18:42, 26:50]  # blocks well inside the texture of `patch_of`
 
 
 def shown(counts: PhotonCounts) -> np.ndarray:
-    grid = counts.grid
-    steps = max(grid.rows, grid.cols) - 1
-    planes = FocalPlanes.at_total_disparity(grid, steps * np.array(DISPARITIES_PX))
+    steps = max(counts.grid.rows, counts.grid.cols) - 1
+    planes = FocalPlanes.at_total_disparity(counts.grid, steps * np.array(DISPARITIES_PX))
     nats = evidence_of_texture(counts, planes, BLOCK_PX, MODEL).nats
     return ShownDepth()(counts, planes, nats, BLOCK_PX, MODEL)
 
@@ -69,5 +67,5 @@ def test_noise_that_all_cameras_share_is_a_surface_where_they_put_it() -> None:
     ),
 )
 def test_even_light_shows_no_depth(rate: float, views: tuple[int, int]) -> None:
-    grid: CameraGrid = unit_grid(*views, 64, 80)
+    grid = unit_grid(*views, 64, 80)
     assert not any(shown(even_light(grid, rate, seed)).any() for seed in range(10))
