@@ -33,6 +33,7 @@ Stage = Literal[
     "emission candidates",
     "candidate numbers",
     "candidate times",
+    "lamp rays",
 ]
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")
 """Stages that describe the cameras themselves. They depend on the recipe's seed alone, so that the same

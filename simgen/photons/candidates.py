@@ -22,14 +22,31 @@ from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.sensor.photon_table import PhotonTable, no_photons
 
 
+class ImageCells(NamedTuple):
+    """Cells of the films in which images of lamps in mirrors and glass are drawn apart (`mirror_images`).
+
+    A px has `per_px` cells to a side; `number` (M,) uint64, sorted, are those of the cells, counted along
+    rows, columns of all films. What is seen there by mirrors alone is drawn apart if it is brighter than
+    `above`.
+    """
+
+    per_px: int
+    number: np.ndarray
+    above: float
+
+
 @dataclass(frozen=True)
 class Setup:
-    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments."""
+    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments.
+
+    Paths through the film leave out what is drawn apart in `image_cells`.
+    """
 
     render_scene: RenderScene
     cameras: Cameras
     cfa: str | None
     max_depth: int
+    image_cells: ImageCells | None = None
 
     @cached_property
     def rig(self) -> Rig:

@@ -19,8 +19,8 @@ from simgen.photons.candidates import (
 )
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
-from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned
-from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
+from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned, whole
+from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, mirrored_radiance, radiance_along
 from simgen.renderer.wavelengths import light_of, of_colour
 from simgen.sensor.photon_table import PhotonTable
 
@@ -134,6 +134,23 @@ class WavefrontSampler(CandidateSampler):
             dr.eval(guess, light)
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
+
+    def trace_mirrored(
+        self, points: FilmPoints, above: float, seed: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is brighter than `above` and seen by mirrors alone through these points of films (N,).
+
+        Its radiance (N,) in each pixel's own colour, and the object and depth of the first hit.
+        """
+        mi, setup = self.mi, self.setup
+        candidates = self._at(self._sampler(seed, points.view.size), points)
+        first = self._hit_first(candidates)
+        self.dr.make_opaque(*candidates, vars(first))
+        sampler = self._sampler(seed ^ PATH_SEED_MASK, points.view.size)
+        path = self._rays(candidates), first.record, sampler, setup.max_depth, opaque(mi.Float, above)
+        radiance = self._in_own_colour(mirrored_radiance(setup.render_scene, *path), candidates)
+        object_id = setup.render_scene.object_of_shape[np.array(first.shape)]
+        return np.array(radiance), object_id, np.array(first.z_mm)
 
     def _upload_bounds(self, majorant: Majorant | None) -> tuple[Any, Any]:
         """Both bounds of every entry; 0 without a majorant."""
@@ -256,10 +273,29 @@ class WavefrontSampler(CandidateSampler):
         self.dr.make_opaque(*candidates, vars(first))
         # Not the candidates' numbers, which decided which of them are followed.
         sampler = self._sampler(seed ^ PATH_SEED_MASK, len(candidates.k))
-        rays, longest = self._rays(candidates), self.setup.max_depth
-        light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest)
+        rays, longest, left_out = self._rays(candidates), self.setup.max_depth, self._left_out(candidates)
+        light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest, left_out)
         self.dr.eval(light)
         return light
+
+    def _left_out(self, candidates: Candidates) -> tuple[Any, Any] | None:
+        """Which candidates lie in cells in which images of lamps are drawn apart, and what of them."""
+        cells, mi, dr, grid = self.setup.image_cells, self.mi, self.dr, self.setup.grid
+        if cells is None:
+            return None
+        row, col = (
+            mi.UInt64(dr.floor((place + 0.5) * cells.per_px))
+            for place in (candidates.row_px, candidates.col_px)
+        )
+        view = mi.UInt64(candidates.k) * grid.cols + mi.UInt64(candidates.l)
+        number = (view * (grid.height * cells.per_px) + row) * (grid.width * cells.per_px) + col
+        known = whole(mi, cells.number)
+        low, high = mi.UInt32(0), mi.UInt32(cells.number.size - 1)
+        for _ in range(cells.number.size.bit_length()):
+            middle = (low + high) >> 1
+            before = gathered(known, middle) < number
+            low, high = dr.select(before, dr.minimum(middle + 1, high), low), dr.select(before, high, middle)
+        return gathered(known, low) == number, opaque(mi.Float, cells.above)
 
     def _rays(self, candidates: Candidates) -> Any:
         at = candidates.k, candidates.l, candidates.row_px, candidates.col_px, candidates.lens_point
