@@ -97,10 +97,10 @@ def straight_light(setup: Setup) -> list[BrightLight]:
     rng = seeds.generator(SEED, stage="aimed pilot", part=2)
     arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % setup.grid.view_count, rng)
     light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
-    number = emission.numbers[arriving.surface]
     rows = _rows(arriving.surface, light, arriving.radiance)
+    names = [_name(setup, number) for number in emission.numbers.tolist()]
     return [
-        BrightLight.of(_name(setup, int(number[row[0]])), light[row], arriving.radiance[row]) for row in rows
+        BrightLight.of(names[arriving.surface[row[0]]], light[row], arriving.radiance[row]) for row in rows
     ]
 
 
@@ -136,15 +136,14 @@ def mirrored_light(
         parts.append((number, arrivals.take(is_own)))
         rays += number
         light = np.concatenate([part.light * (of * lamps.size / rays) for of, part in parts])
-        error, matters = 2 * np.sqrt((light**2).sum()), LEAST_SHARE * film_light
-        # Of what no ray has met three may be expected: the bound has a confidence of 95 %.
-        possible = 3 * brightest * lamps.size * number / rays
-        does_not_matter = light.sum() + error + possible < matters
+        # Two standard errors, and of what no ray has met three rays, have a confidence of 95 %.
+        error = 2 * np.sqrt((light**2).sum()) + 3 * brightest * lamps.size * number / rays
+        does_not_matter = light.sum() + error < LEAST_SHARE * film_light
         if does_not_matter or error < KNOWN_TO * (film_light + light.sum()) or rays >= MAX_RAYS:
             break
     arrivals = Arrivals(*map(np.concatenate, zip(*(part for _, part in parts), strict=True)))
     arrivals, result = arrivals._replace(light=light), []
-    if light.sum() <= matters:
+    if light.sum() <= LEAST_SHARE * film_light:
         return []
     for row in _rows(arrivals.lamp * 2 + arrivals.is_scattered, light, arrivals.radiance):
         own = arrivals.take(row)
@@ -159,8 +158,8 @@ def mirrored_light(
 def lit_light(
     setup: Setup, sampler: CandidateSampler, film_light: float, paths: float
 ) -> tuple[list[BrightLight], Samples]:
-    """What a lamp that stands at a point lights so brightly, as a spot lamp its dot, that `paths` may not meet
-    it; and paths that do."""
+    """What a lamp that stands at a point lights so brightly, as a spot lamp its dot, that `paths` may not
+    meet it; and paths that do."""
     tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, 0.0)
     least_radiance = brightest_that_matters(film_light, paths, setup.grid.height * setup.grid.width)
     rows, seen = list[BrightLight](), [nothing(setup.channels).exceeding]

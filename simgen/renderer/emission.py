@@ -27,8 +27,8 @@ NODES = 32
 POINTS = 1 << 12
 """Points on the surface of an object at which its light is summed up."""
 NARROW_DEG = 1.0
-"""A spot lamp whose cutoff is below this is a projector: Mitsuba compares cosines in single precision, by which
-a spot of 1 degree is right to 4e-4, of 0.1 degrees to 4e-2, and one of 0.01 degrees gives no light."""
+"""A spot lamp whose cutoff is below this is a projector: Mitsuba compares cosines in single precision, by
+which a spot of 1 degree is right to 4e-4, of 0.1 degrees to 4e-2, and one of 0.01 degrees gives no light."""
 BEAM_PX, BEAM_PARTS, BEAM_MARGIN = 128, 8, 1.02
 """Side of the beam's picture, parts of a pixel's side that it is averaged over, and its half width over the
 cutoff."""

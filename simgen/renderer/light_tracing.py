@@ -110,7 +110,7 @@ class LampTracer:
         return [-1 if lamp.is_environment() else int(ids[lamp.get_shape().id()]) for lamp in self.lamps]
 
     def radiance_of(self, lamp: np.ndarray, seed: int) -> np.ndarray:
-        """Radiance (N,), in random colours of the sensor, of a point of each lamp (N,), drawn by brightness."""
+        """Radiance (N,), in random colours of the sensor, of a point of each lamp, drawn by brightness."""
         return self._leave(lamp, np.random.default_rng(seed))[2]
 
     def follow(self, lamp: np.ndarray, seed: int, least_radiance: float) -> tuple[Arrivals, float]:
@@ -204,8 +204,8 @@ class LampTracer:
     def _leave(
         self, lamp: np.ndarray, rng: np.random.Generator
     ) -> tuple[_Rays, np.ndarray, np.ndarray, np.ndarray]:
-        """A ray from a point of each lamp (N,), drawn by brightness; the share (N, S) of its power that a pixel of
-        a random colour sees, the radiance (N,) of the point as that pixel sees it, and its largest part."""
+        """A ray from a point of each lamp (N,), drawn by brightness; the share (N, S) of its power that a pixel
+        of a random colour sees, the radiance (N,) of the point as it sees it, and its largest part (N,)."""
         filters, number = self.render_scene.filters, lamp.size
         wavelength_nm, weight = np.zeros((number, 0)), np.eye(3)[rng.integers(0, 3, number)]
         if filters is not None:

@@ -225,7 +225,7 @@ def test_a_lamp_that_the_probe_misses_is_in_the_forecast() -> None:
     lamp_px = 0.0003
     luminance = 64 * 64 * WALL_RADIANCE / lamp_px
     size_mm = np.sqrt(lamp_px) / PX_PER_MM
-    looked = probe(built(wall(shining(SHAPES["card"](size_mm), luminance))), GRID, "GRBG", seed=1)
+    looked = probe(Setup(built(wall(shining(SHAPES["card"](size_mm), luminance))), GRID, "GRBG", 3), seed=1)
     assert looked.mean == pytest.approx(2 * WALL_RADIANCE, rel=0.2)
     assert looked.variance == pytest.approx(lamp_px / 64**2 * luminance**2, rel=0.3)
 
