@@ -143,15 +143,18 @@ def _mitsuba() -> Any:
     with _uninterrupted():
         import mitsuba as mi
 
-    # Mitsuba runs any library in plugins/ of the folders where it looks, and the first is the working one.
-    resolver: Any = mi.file_resolver()
-    resolver.clear()
-    resolver.append(str(Path(mi.__file__).parent))
+    _trust_own_files_alone(mi)
     if (threads := threads_of_worker()) is not None:
         import drjit as dr
 
         dr.set_thread_count(threads)
     return mi
+
+
+def _trust_own_files_alone(mi: Any) -> None:
+    """Let Mitsuba look for plugins, which it runs, in its package alone, not in the working directory."""
+    mi.file_resolver().clear()
+    mi.file_resolver().append(str(Path(mi.__file__).parent))
 
 
 @contextlib.contextmanager
