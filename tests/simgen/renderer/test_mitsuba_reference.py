@@ -249,25 +249,25 @@ def test_names_of_files_are_looked_up_as_mitsuba_does_but_never_in_the_working_d
 ) -> None:
     """An included file is first looked for beside the file that includes it, a mesh beside the first file."""
     folder, elsewhere = tmp_path / "scene", tmp_path / "elsewhere"
+    light = '<emitter type="point"><spectrum name="intensity" filename="%s"/></emitter>'
     written = {
-        "scene.xml": CAMERA + '<include filename="part/a.xml"/>',
+        "scene.xml": CAMERA + light % "s.spd" + '<include filename="part/a.xml"/>',
         "part/a.xml": '<include filename="b.xml"/>',
-        "part/b.xml": OBJ % "m.obj"
-        + '<emitter type="constant"><spectrum name="radiance" filename="d.spd"/></emitter>',
+        "part/b.xml": OBJ % "m.obj" + light % "d.spd",
         "b.xml": '<shape type="sphere" id="wrong"/>',
     }
     for name, content in written.items():
         written[name] = f'<scene version="3.0.0">{content}</scene>'
-    written |= {"m.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "part/d.spd": "400 1\n700 1\n"}
+    written |= dict.fromkeys(["s.spd", "part/d.spd"], "400 1\n700 1\n") | {"part/m.obj": "not this one"}
+    written["m.obj"] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"
     for name, content in written.items():
         for place, text in ((folder, content), (elsewhere, "not this one")):
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_text(text)
-    (elsewhere / "d.spd").write_text("not this one")
     monkeypatch.chdir(elsewhere)
     assert reference_to(backend.load(), MitsubaFile(file="scene.xml"), folder).names == ("m",)
     imported = simgen.import_scene(folder / "scene.xml", tmp_path / "copy")
-    assert imported.files == ("scene.xml", "part/a.xml", "part/b.xml", "m.obj", "part/d.spd")
+    assert imported.files == ("scene.xml", "s.spd", "part/a.xml", "part/b.xml", "m.obj", "part/d.spd")
 
 
 @pytest.mark.renders
