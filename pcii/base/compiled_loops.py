@@ -16,6 +16,9 @@ import numba as nb
 
 from pcii.base.executor import threads_of_worker
 
+# Numba runs what its cache holds; a .numba_config.yaml in the working directory may not say where that is.
+nb.config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")  # type: ignore[attr-defined]
+
 compiled = nb.njit(nogil=True, cache=True)
 """Decorator of a compiled function."""
 helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # type: ignore

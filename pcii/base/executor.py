@@ -1,5 +1,6 @@
 """Where the pieces of work are done: in this process, in local worker processes, or on a Dask cluster."""
 
+import contextlib
 import logging
 import os
 import pickle
@@ -7,7 +8,7 @@ import queue
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -80,6 +81,7 @@ def _do_elsewhere(piece: int, pickled: bytes | None = None) -> Any:
 # Local worker processes
 
 
+SAFE_PATH = "PYTHONSAFEPATH"
 WAKING_S = 0.25
 """So often is looked whether Ctrl-C was pressed, which a longer wait would notice later."""
 
@@ -92,14 +94,12 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
     pickled, threads = pickle.dumps(work), max(1, (os.cpu_count() or 1) // count)
     # Not forked: what other threads hold locked would be locked for ever in the copy.
     spawning = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, spawning, _begin_worker, (threads, pickled))
+    worker = threads, pickled, os.environ.get(SAFE_PATH)
+    with _starting_processes():  # the pool has one that tidies up
+        pool = ProcessPoolExecutor(count, spawning, _begin_worker, worker)
     try:
-        # Workers inherit the mask: Ctrl-C reaches all processes, and this one ends the others.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-        try:
+        with _starting_processes():
             futures = {pool.submit(_do_elsewhere, piece): piece for piece in pieces}
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for future in futures:
             future.add_done_callback(done.put)
         left = len(futures)
@@ -119,13 +119,37 @@ def _run_in_processes(work: Work, pieces: Sequence[int], count: int) -> Generato
         pool.shutdown(cancel_futures=True)
 
 
+@contextlib.contextmanager
+def _starting_processes() -> Iterator[None]:
+    """How processes begin that are started in this block.
+
+    Ctrl-C reaches all of them and is left to this one, which ends the others. They import nothing from the
+    working directory, where a new Python looks for its own library first.
+    """
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    safe_path = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        _set_safe_path(safe_path)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _set_safe_path(value: str | None) -> None:
+    os.environ.pop(SAFE_PATH, None)
+    if value is not None:
+        os.environ[SAFE_PATH] = value
+
+
 _threads_of_worker: int | None = None
 _work_of_worker = b""
 
 
-def _begin_worker(threads: int, pickled: bytes) -> None:
+def _begin_worker(threads: int, pickled: bytes, safe_path: str | None) -> None:
     global _threads_of_worker, _work_of_worker
     _threads_of_worker, _work_of_worker = threads, pickled
+    _set_safe_path(safe_path)  # of programs that the work starts
     threading.Thread(target=_end_with_starter, daemon=True).start()
 
 

@@ -8,7 +8,7 @@ from pcii.base.errors import InputError
 from pcii.types.arrays import check_z_mm
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
+from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
 
 MOST_SPAN_PX = 2000.0
 """Largest change of total disparity between the ends of a range that is searched."""
@@ -21,13 +21,24 @@ def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
     near, far = check_z_mm(z_range_mm).tolist()
     if near >= far:
         raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    check_search(grid, "z_range_mm", np.array([near, far]))
+    return near, far
+
+
+def check_search(grid: CameraGrid, name: str, z_mm: np.ndarray) -> None:
+    """Raise `InputError`, which begins with `name`, unless all depths between the depths `z_mm` (Z,) can be
+    searched: they are not too many, and two cameras see the same at the farthest."""
+    near, far = z_mm.min(), z_mm.max()
     span = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
     if span > MOST_SPAN_PX:
         raise InputError(
-            f"z_range_mm: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
+            f"{name}: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
             f"most {MOST_SPAN_PX:g} px can be searched; choose a farther near end"
         )
-    return near, far
+    # From camera to camera a point moves by its disparity: by a film or more, it is on one film alone.
+    axes = zip(disparity_px(grid, far), (grid.width, grid.height), (grid.cols, grid.rows), strict=True)
+    if not any(cameras > 1 and disparity < size for disparity, size, cameras in axes):
+        raise InputError(f"{name}: up to {far:g} mm no two cameras see the same; choose a farther end")
 
 
 def peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:

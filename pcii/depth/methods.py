@@ -15,7 +15,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.depth_planes import check_range_mm
+from pcii.depth.depth_planes import check_range_mm, check_search
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.types.estimates import DepthMap, DepthPosterior
@@ -95,6 +95,7 @@ def depth_posterior(
     z_range_mm = _checked_range_mm(data, z_range_mm)
     warn_of_saturation(data)
     requested = NO_DEPTHS if z_mm is None else FocalPlanes.at_depths(data.grid, z_mm).z_mm
+    check_search(data.grid, "z_mm", np.append(requested, z_range_mm))
     return PosteriorDepth().posterior(data, z_range_mm, requested)
 
 

@@ -12,9 +12,17 @@ from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.pages import ABOUT_YARDSTICKS, accuracy_plot, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
-from pcii.evaluation.summary import Kind, means, means_over_scenes, ranks, with_yardsticks
+from pcii.evaluation.summary import (
+    LOOK_AT_NO_PHOTON,
+    Kind,
+    means,
+    means_over_scenes,
+    ranks,
+    with_yardsticks,
+)
 from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
 from pcii.store.collection import IN_FRAMES
+from pcii.store.folders import ROWS
 from pcii.store.verification import verify_scores
 
 if TYPE_CHECKING:
@@ -87,35 +95,41 @@ def write_page(folder: Path, out: Path) -> int:
     """Write the page of all submissions in a folder, each a folder of its own; returns how many there are.
 
     Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
-    one method, and submissions of several benchmarks.
+    one name, a name that could be taken for another one, and submissions of several benchmarks.
     """
-    submissions: dict[Path, dict[str, Any]] = {}
+    submissions: dict[Path, ScoredSubmission] = {}
     for file in sorted(folder.glob(f"*/{SUBMISSION}")):
         verify_scores(file.parent, MAX_BYTES)
-        submissions[file.parent] = read_as(ScoredSubmission, file.parent).model_dump(exclude_none=True)
+        submissions[file.parent] = read_as(ScoredSubmission, file.parent)
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
     for name in ("benchmark", "half"):
-        values = sorted({about[name] for about in submissions.values()})
+        values = sorted({getattr(about, name) for about in submissions.values()})
         if len(values) > 1:
             raise InputError(f"{folder}: submissions are of more than one {name}: {', '.join(values)}")
     rows: list[Row] = []
     folder_of: dict[str, Path] = {}
-    for inside in submissions:
+    for inside, about in submissions.items():
+        for method in about.methods:
+            other = folder_of.setdefault(method.casefold(), inside)
+            if other != inside:
+                names = f"{other.name} and {inside.name}"
+                raise InputError(f"{folder}: {names} are both of {about.method!r}, in upper or lower case")
         own = by_scene(read_rows(inside))
+        others = {row["method"] for row in own}.difference(about.methods)
+        if others:
+            raise InputError(
+                f"{inside / ROWS}: has rows of {min(others)!r}, which {SUBMISSION} does not name"
+            )
         rows += own
-        for method in {row["method"] for row in own}:
-            if folder_of.setdefault(method, inside) != inside:
-                names = f"{folder_of[method].name} and {inside.name}"
-                raise InputError(f"{folder}: {names} are both of {method!r}")
     frame = with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
-    about = next(iter(submissions.values()))
+    first = next(iter(submissions.values()))
     of_cells = means(frame)
     content = {
-        "benchmark": about["benchmark"],
-        "half": about["half"],
+        "benchmark": first.benchmark,
+        "half": first.half,
         "yardsticks": ABOUT_YARDSTICKS,
         "scenes": of_scenes["scene"].nunique(),
         "kinds": [
@@ -127,7 +141,7 @@ def write_page(folder: Path, out: Path) -> int:
             rank_table(ranks(of_scenes, measure), f"{title} over all scenes")
             for measure, title in TITLES.items()
         ],
-        "submissions": _submission_table(submissions, folder_of, frame),
+        "submissions": _submission_table(submissions, frame),
     }
     write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
     return len(submissions)
@@ -181,8 +195,7 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
 
     has_measure = of(comparison.measure)[["scene", "light", "method"]]
     values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)
-    # Those who look at no photon last.
-    methods = sorted(has_measure["method"].unique(), key=lambda name: (name.startswith("("), name))
+    methods = sorted(has_measure["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
     bounds = of(comparison.bound_measure).merge(has_measure).drop_duplicates(["scene", "light"], keep="last")
     if len(bounds):
         photons = of("photons_per_view").merge(bounds[["scene", "light", "method"]])
@@ -192,25 +205,23 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
     return values.assign(method=pd.Categorical(values["method"], methods))
 
 
-def _submission_table(
-    submissions: Mapping[Path, Mapping[str, Any]], folder_of: Mapping[str, Path], frame: "DataFrame"
-) -> Table:
+def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> Table:
     """Whose each method is, and the command that measures it again, in a folder of its own."""
+    scores = frame.drop_duplicates(["method", "identity", "light"])["method"].value_counts()
     rows = []
-    for method, folder in sorted(folder_of.items()):
-        about = submissions[folder]
-        is_run = about["made"].startswith("run")
-        work = ["run", about.get("command_name", method)] if is_run else ["score", "MAPS"]
-        options = ["--data", "BENCHMARK", "--half", about["half"], "-o", f"submissions/{folder.name}"]
-        rows.append(
-            (
-                method,
-                str(about.get("authors", "–")),
-                str(about.get("url", "–")),
-                str(about.get("trained_on", "–")),
-                str(len(frame[frame["method"] == method].drop_duplicates(["identity", "light"]))),
-                shlex.join(["pcii", "benchmark", *work, *options]),
+    for folder, about in submissions.items():
+        for method in filter(scores.__contains__, about.methods):
+            work = ["run", about.command_name or method] if about.is_run else ["score", "MAPS"]
+            options = ["--data", "BENCHMARK", "--half", about.half, "-o", f"submissions/{folder.name}"]
+            rows.append(
+                (
+                    method,
+                    about.authors or "–",
+                    about.url or "–",
+                    about.trained_on or "–",
+                    str(scores[method]),
+                    shlex.join(["pcii", "benchmark", *work, *options]),
+                )
             )
-        )
     header = ("method", "authors", "url", "trained on", "scores", "command")
-    return Table("Submissions", header, tuple(rows), words=4)
+    return Table("Submissions", header, tuple(sorted(rows)), words=4)

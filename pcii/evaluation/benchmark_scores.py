@@ -7,7 +7,6 @@ Photons, frames and full light of a scene are datasets of their own, and one sce
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
@@ -15,10 +14,18 @@ from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.measurement import EvaluationJob, measure
-from pcii.evaluation.method_names import depth_name, estimator_of, named_method
+from pcii.evaluation.method_names import named_method
 from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
-from pcii.evaluation.submissions import SUBMISSION, read_maps, read_submission, tasks_of_submission
+from pcii.evaluation.submissions import (
+    RUN,
+    SCORED,
+    SUBMISSION,
+    ScoredSubmission,
+    read_maps,
+    read_submission,
+    tasks_of_submission,
+)
 from pcii.evaluation.tasks import Task, tasks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.collection import (
@@ -30,6 +37,7 @@ from pcii.store.collection import (
     read_collection,
 )
 from pcii.store.dataset import Dataset
+from pcii.store.manifests import validated
 from pcii.store.suggested_depths import planes_of
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_limit import FULL_LIGHT, Light
@@ -101,10 +109,13 @@ def run_method(
 
     `method` is a name, as of `pcii.evaluate`. Without `budgets` it is scored at all light that there is. Rows
     that are in the folder already are kept, as by `evaluate`. `about` are further members of
-    submission.json. Raises `InputError` for a method that is not there, for budgets that no dataset has, and
-    as `evaluate` does.
+    submission.json. Raises `InputError` for a method that is not there, for what submission.json cannot have,
+    for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_method(method)
+    whose = {name: text for name, text in about.items() if text}
+    whose |= {"benchmark": data.benchmark, "method": named.name, "half": data.half}
+    submission = validated(ScoredSubmission, whose | {"made": RUN, "command_name": method})
     requested = {str(Light.parse(each)) for each in budgets}
     tasks: list[Task] = []
     for dataset in data.datasets:
@@ -118,9 +129,7 @@ def run_method(
     if not tasks:
         words = " or ".join(budgets) or "light that it takes"
         raise InputError(f"budget: no dataset of the {data.half} half that {method!r} can take has {words}")
-    whose = {name: text for name, text in about.items() if text}
-    whose |= {"method": named.name, "made": "run by pcii benchmark run", "command_name": method}
-    return _score(BenchmarkJob(tasks, data), data, out, whose, executor, report)
+    return _score(BenchmarkJob(tasks, data), submission, out, executor, report)
 
 
 def score_submission(
@@ -140,27 +149,24 @@ def score_submission(
     for number, task in enumerate(tasks, start=1):
         read_maps(folder, task)
         report("checks", number, len(tasks))
-    about = submission.model_dump(exclude_none=True) | {"made": "scored from maps by pcii benchmark score"}
-    return _score(BenchmarkJob(tasks, data, folder.resolve()), data, out, about, executor, report)
+    scored = ScoredSubmission(**submission.model_dump(), made=SCORED, half=data.half)
+    return _score(BenchmarkJob(tasks, data, folder.resolve()), scored, out, executor, report)
 
 
 def _score(
     job: BenchmarkJob,
-    data: BenchmarkHalf,
+    submission: ScoredSubmission,
     out: Path,
-    about: Mapping[str, Any],
     executor: Executor,
     report: Report,
 ) -> Evaluation:
     """Measure what is missing, and write the evaluation with what there is to say about the submission."""
-    name = estimator_of(about["method"]) or about["method"]
-    names = {about["method"]} if job.maps is None else {name, depth_name(name)}
     with writing_rows(out) as file:
-        others = {row["method"] for row in file.rows.values()} - names
+        others = {row["method"] for row in file.rows.values()}.difference(submission.methods)
         if others:
             raise InputError(f"{out}: holds scores of {min(others)!r}; name another folder")
         made_again = measure(job, file, executor, report)
-        write_json_safely(out / SUBMISSION, {"benchmark": data.benchmark, **about, "half": data.half})
+        write_json_safely(out / SUBMISSION, submission.model_dump(exclude_none=True))
         rows = list(file.rows.values())
         evaluation = Evaluation(out, frame_of(by_scene(rows)), origin_of(rows), made_again)
         write_evaluation(out, evaluation.frame, evaluation.origin, (SUBMISSION,))

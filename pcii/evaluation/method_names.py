@@ -2,6 +2,9 @@
 
 A function that nobody has registered is named "module:function" or "file.py:function", with "depth:" before
 it for depth; in Python it is given itself, or as a pair of a name and the function.
+
+After `depth:` no name has a colon, so that a full name says which of the two a method is; and none has
+brackets, since tables name in parentheses what is no method.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,6 +13,7 @@ from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function, name_of
+from pcii.base.plain_text import is_plain_name
 from pcii.depth import methods as depth
 from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.removal import methods as removal
@@ -19,6 +23,7 @@ from pcii.store.software import own_software, software_with
 DEPTH = "depth"
 """Names the default estimator of depth, which has its full name in rows."""
 _PREFIX = f"{DEPTH}:"
+_NOT_IN_NAMES = frozenset(":()[]{}")
 Function = Callable[..., Any]
 Method = str | Function | tuple[str, Function]
 """What may be given as a method: a name, a removal, or a name and a function."""
@@ -135,6 +140,24 @@ def named_method(method: Method) -> NamedMethod:
 
 
 def _checked(method: NamedMethod) -> NamedMethod:
-    if method.name in (DEPTH, *known_methods()):
-        raise InputError(f"methods: the name {method.name!r} is taken; give the function another name")
+    check_name(method.name, "methods")
     return method
+
+
+def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
+    """Raise `InputError`, which begins with `label`, for a full name that could be taken for another one.
+
+    Beside what `is_plain_name` says, it has no colon but that of `depth:`, and no bracket. It differs from
+    those of known methods by more than case, or else, if it `may_be_known`, is one of them.
+    """
+    own = name.removeprefix(_PREFIX)
+    if not is_plain_name(own) or not own or _NOT_IN_NAMES & {*own}:
+        raise InputError(
+            f"{label}: expected a name of letters (of one alphabet in each word), digits, single blanks and "
+            f"ASCII punctuation other than colons and brackets, in Unicode's form NFKC, got {own!a}"
+        )
+    known = known_methods()
+    if may_be_known and name in known:
+        return
+    if name.casefold() in {other.casefold() for other in (DEPTH, *known)}:
+        raise InputError(f"{label}: the name {name!r} is taken; choose another one")

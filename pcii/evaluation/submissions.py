@@ -12,15 +12,23 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 from numpy.lib import format as npy_format
-from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    StringConstraints,
+    ValidationError,
+    model_validator,
+)
 
 from pcii.base.errors import InputError
-from pcii.evaluation.method_names import NamedMethod, depth_name, estimator_of, named_method
+from pcii.base.plain_text import is_plain, web_address
+from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of
 from pcii.evaluation.tasks import Task
 from pcii.store.collection import Half
 from pcii.store.dataset import Dataset
@@ -35,28 +43,71 @@ MIN_MM, MAX_MM = 1e-3, 1e12
 """Nearest and farthest depth of an answer: errors of others overflow."""
 MAX_OVERHEAD_BYTES = 1 << 16
 """Size of a submission.json at most, and of what an .npz file has beside its numbers."""
+Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
+RUN, SCORED = get_args(Made)
+
+
+def _plain(text: str) -> str:
+    if not is_plain(text):
+        raise InputError(
+            f"expected letters that are seen, single blanks and Unicode's form NFKC, got {text!a}"
+        )
+    return text
+
+
+def _address(text: str) -> str:
+    if text != web_address(text):
+        raise InputError(f"expected an address such as https://example.org/method, got {text!a}")
+    return text
+
+
 Text = Annotated[str, StringConstraints(min_length=1)]
+AnySubmission = TypeVar("AnySubmission", bound="Submission")
 
 
 class Submission(BaseModel):
-    """What submission.json says: the benchmark, the name of the method, and more if its authors like."""
+    """What submission.json says: the benchmark, the name of the method, and more if its authors like.
+
+    The name is without `depth:`, and new for masks and for depth.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     benchmark: Text
     method: Text
-    authors: Text | None = None
-    url: Text | None = None
+    authors: Annotated[Text, AfterValidator(_plain)] | None = None
+    url: Annotated[Text, AfterValidator(_address)] | None = None
     description: Text | None = None
     trained_on: Text | None = None
 
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return False
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Full names of what may be scored: of the one method that was run, or of depth and masks in maps."""
+        return (self.method,) if self.is_run else (depth_name(self.method), self.method)
+
+    @model_validator(mode="after")
+    def _has_good_names(self) -> Self:
+        for name in self.methods:
+            check_name(name, "method", may_be_known=self.is_run)
+        return self
+
 
 class ScoredSubmission(Submission):
-    """What the submission.json of a folder of scores says."""
+    """What the submission.json of a folder of scores says; a method that was run has its full name there."""
 
-    half: Half
-    made: Text
+    made: Made
     command_name: Text | None = None
+    half: Half
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return self.made == RUN
 
 
 def read_submission(folder: Path, benchmark: str) -> Submission:
@@ -64,19 +115,19 @@ def read_submission(folder: Path, benchmark: str) -> Submission:
     submission, file = read_as(Submission, folder), folder / SUBMISSION
     if submission.benchmark != benchmark:
         raise InputError(f"{file}: benchmark: is {submission.benchmark!r}, but the data are of {benchmark!r}")
-    named_method((submission.method, _read_as_maps))  # raises `InputError` for a name that is taken
     return submission
 
 
-def read_as(model: type[Submission], folder: Path) -> Submission:
+def read_as(model: type[AnySubmission], folder: Path) -> AnySubmission:
     """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
     file = folder / SUBMISSION
     _check_file(folder, file, MAX_OVERHEAD_BYTES)
     try:
         return model.model_validate_json(file.read_bytes())
     except ValidationError as fault:
-        expected = f"expected a JSON object of {', '.join(model.model_fields)}"
-        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None
+        is_of_a_value = fault.errors()[0]["type"] == "value_error"
+        expected = f"; expected a JSON object of {', '.join(model.model_fields)}"
+        raise InputError(f"{file}: {first_fault(fault)}{'' if is_of_a_value else expected}") from None
 
 
 def _check_file(folder: Path, file: Path, max_bytes: int) -> None:

@@ -37,6 +37,8 @@ YARDSTICKS = {"everything": "(everything)", "one_depth": "(one depth)"}
 
 One claims everything at every plane, the other answers the one depth that is right for most pixels; `NOTHING`
 claims nothing and answers nowhere."""
+LOOK_AT_NO_PHOTON = (NOTHING, *YARDSTICKS.values())
+"""Names in parentheses, which no method has: see `method_names.check_name`."""
 
 
 class Mean(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from pcii.base.plain_text import in_markdown
 from pcii.depth.methods import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
-from pcii.evaluation.summary import MORE_IS_BETTER, NOTHING, YARDSTICKS, lines_of, ranks
+from pcii.evaluation.summary import LOOK_AT_NO_PHOTON, MORE_IS_BETTER, lines_of, ranks
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 TITLES = {"iou": "IoU", "within_1px": "Share of depths within 1 px"}
 """What methods of removal and of depth are compared by, more being better."""
 SWEEPS = tuple(name for name in FOR_COUNTS if "sweep" in name)
-SIMPLE = (NOTHING, *YARDSTICKS.values(), *map(depth_name, SWEEPS))
+SIMPLE = (*LOOK_AT_NO_PHOTON, *map(depth_name, SWEEPS))
 """What any method should beat."""
 NOT_BETTER = "†"
 """Mark of a mean that is no better than the best of `SIMPLE` for the same scene and light."""

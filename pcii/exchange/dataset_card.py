@@ -1,15 +1,17 @@
 """README.md of a dataset or collection: what it is, how to open it, and under what terms it may be used.
 
 It depends on the data and the terms alone, and no manifest lists it: other terms make no other dataset.
+LICENSE has the terms alone, where programs that collect data look for them.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from pcii.base.plain_text import in_markdown, web_address
+from pcii.base.plain_text import in_markdown, visible, web_address
 from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
 from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
+from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
 
 PROJECT = "photon-integral-imaging"
 LICENCE = "BSD-3-Clause"
@@ -41,6 +43,15 @@ Licence: {licence}. By {creators}. Please cite:
 
 > {citation}
 """
+OPENING = "The data in this folder may be used under the terms of"
+"""A LICENSE without this line is somebody else's."""
+LICENCE_TEXT = """{opening} {licence}:
+{address}
+
+By {creators}. Please cite:
+
+{citation}
+"""
 
 
 @dataclass(frozen=True)
@@ -52,6 +63,16 @@ class Terms:
     citation: str = CITATION
     url: str = ""
 
+    @property
+    def address(self) -> str:
+        """Address of the licence."""
+        return web_address(self.licence) or web_address(f"https://spdx.org/licenses/{self.licence}.html")
+
+    @property
+    def reference(self) -> str:
+        """How to cite the data, and where they are."""
+        return f"{self.citation} {self.url}".strip()
+
 
 def write_card(root: Path, terms: Terms) -> None:
     """Write README.md of a finished dataset or of a collection; `InputError` for a folder that is neither.
@@ -61,30 +82,47 @@ def write_card(root: Path, terms: Terms) -> None:
     """
     if is_collection(root):
         fields = ", ".join(read_collection(root).fields)
-        title, example = "Integral images", 'dataset = pcii.open_collection("FOLDER")[0]'
+        title = str(read_collection(root).recipe.get("title") or "Integral images")
+        example = 'dataset = pcii.open_collection("FOLDER")[0]'
         content = f"A collection of {len(read_index(root))} datasets, which differ in {in_markdown(fields)}."
     else:
         manifest, example = read_manifest(root), 'dataset = pcii.open_dataset("FOLDER")'
         title, grid = manifest.title or "Integral images", manifest.grid
         pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
         content = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, {pattern}."
-    address = web_address(terms.licence) or web_address(f"https://spdx.org/licenses/{terms.licence}.html")
     text = TEXT.format(
         title=in_markdown(title),
         content=f"Integral imaging in little light. {content}",
         install=INSTALL,
         example=example,
-        licence=f"[{in_markdown(terms.licence)}](<{address}>)",
+        licence=f"[{in_markdown(terms.licence)}](<{terms.address}>)",
         creators=", ".join(in_markdown(name) for name in terms.creators),
-        citation=in_markdown(f"{terms.citation} {terms.url}".strip()),
+        citation=in_markdown(terms.reference),
     )
-    encoded, file = text.encode(errors="backslashreplace"), root / CARD
+    _write(root, CARD, text, INSTALL)
+
+
+def write_licence(root: Path, terms: Terms) -> None:
+    """Write LICENSE of a finished dataset or of a collection, on the conditions of `write_card`."""
+    text = LICENCE_TEXT.format(
+        opening=OPENING,
+        licence=visible(terms.licence),
+        address=terms.address,
+        creators=", ".join(map(visible, terms.creators)),
+        citation=visible(terms.reference),
+    )
+    _write(root, LICENCE_FILE, text, OPENING)
+
+
+def _write(root: Path, name: str, text: str, mark: str) -> None:
+    """Write a file of this text, unless there is one without `mark`."""
+    encoded, file = text.encode(errors="backslashreplace"), root / name
     if file.is_file():
         present = file.read_bytes()
-        is_written = present == encoded and not temporaries_of(root, CARD)
-        if is_written or INSTALL.encode() not in present:
+        is_written = present == encoded and not temporaries_of(root, name)
+        if is_written or mark.encode() not in present:
             return
     with locked(root / (COLLECTION if is_collection(root) else MANIFEST), root):
-        for temporary in temporaries_of(root, CARD):  # of a command that was killed
+        for temporary in temporaries_of(root, name):  # of a command that was killed
             temporary.unlink()
         write_bytes_safely(file, encoded)

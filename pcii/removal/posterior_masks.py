@@ -7,6 +7,7 @@ probable one. Nothing is claimed where the depth map has no answer.
 
 import numpy as np
 
+from pcii.depth.depth_planes import check_search
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.imaging.blocks import on_pixels
 from pcii.types.estimates import DepthPosterior, Segmented
@@ -21,7 +22,9 @@ def remove_by_network(
 
     `steps` holds `probability` (Z, H, W) float32, that of belonging to the plane.
     """
-    return masks_of(PosteriorDepth().posterior(counts, z_range_mm, sections.planes.z_mm), sections)
+    z_mm = sections.planes.z_mm
+    check_search(counts.grid, "z_mm", np.append(z_mm, z_range_mm or ()))
+    return masks_of(PosteriorDepth().posterior(counts, z_range_mm, z_mm), sections)
 
 
 def masks_of(posterior: DepthPosterior, sections: Sections) -> Segmented:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from pcii.store.manifests import DatasetManifest
 
 MANIFEST = "manifest.json"
-CARD = "README.md"
-"""What people read of a dataset or collection. No manifest lists it: its terms of use may change."""
+CARD, LICENCE = "README.md", "LICENSE"
+"""What people read of a dataset or collection. No manifest lists them: terms of use may change."""
 MARKER = ".unfinished.json"
 """Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"

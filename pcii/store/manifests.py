@@ -158,10 +158,10 @@ class EvaluationManifest(Manifest):
     files: Files
 
 
-AnyManifest = TypeVar("AnyManifest", bound=Manifest)
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
 
 
-def validated(model: type[AnyManifest], document: Mapping[str, Any]) -> AnyManifest:
+def validated(model: type[AnyModel], document: Mapping[str, Any]) -> AnyModel:
     """The document as a model; raises `InputError` that names the first member that does not fit."""
     try:
         return model.model_validate(document)

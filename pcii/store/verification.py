@@ -8,6 +8,7 @@ from pcii.base.command_line import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, Stages, silent
 from pcii.store.collection import (
+    CERTIFICATE,
     COLLECTION,
     INDEX,
     check_manifest,
@@ -15,7 +16,7 @@ from pcii.store.collection import (
     read_collection,
     read_index,
 )
-from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
+from pcii.store.dataset_layout import CARD, LICENCE, MANIFEST, read_manifest
 from pcii.store.folders import (
     EVALUATION,
     LOCK,
@@ -42,7 +43,7 @@ def verify(path: Path, report: Report = silent) -> int:
     for done, (name, entry) in enumerate(files.items(), start=1):
         check_file(path, name, entry)
         report("verify", done, len(files))
-    _refuse_unlisted(path, document, unlisted_files(path, [document, *files, CARD]))
+    _refuse_unlisted(path, document, unlisted_files(path, [document, *files, CARD, LICENCE]))
     return len(files)
 
 
@@ -85,7 +86,7 @@ def _verify_collection(path: Path, report: Report) -> int:
     for done, row in enumerate(rows, start=1):
         files += 1 + verify(check_manifest(path, row))
         report("verify", done, len(rows))
-    listed = {COLLECTION, INDEX, LOCK, CARD, *(row["path"] for row in rows)}
+    listed = {COLLECTION, INDEX, LOCK, CARD, LICENCE, CERTIFICATE, *(row["path"] for row in rows)}
     _refuse_unlisted(path, INDEX, entries(path, "collection") - listed)
     return files
 

@@ -21,7 +21,15 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
-from pcii.store.collection import BENCHMARK_FIELDS, IN_FRAMES, Half, open_collection
+from pcii.exchange.dataset_card import write_card, write_licence
+from pcii.store.collection import (
+    BENCHMARK_FIELDS,
+    CERTIFICATE,
+    IN_FRAMES,
+    Half,
+    open_collection,
+    read_index,
+)
 from pcii.store.dataset import Dataset
 from pcii.store.folders import hash_json
 from simgen.base.file_lookup import find_all
@@ -34,7 +42,6 @@ from simgen.spec.recipe import Recipe, load_recipe
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
 Photons = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-CERTIFICATE = "certificate.json"
 TILE_PX = 64
 MIN_P = 1e-4
 """The share of benchmarks of the same light that are taken for other ones, by any of their datasets."""
@@ -216,7 +223,24 @@ def make_benchmark(
     if not scenes:
         raise InputError(f"scene: none of these scenes is in the {half} half")
     series = BenchmarkSeries(definition, file.parent.parent, scenes)
-    return generate_collection(series, out, executor, report)
+    faults = generate_collection(series, out, executor, report)
+    _write_terms(series, out)
+    return faults
+
+
+def _write_terms(series: BenchmarkSeries, out: Path) -> None:
+    """README.md and LICENSE of the collection, and of its datasets, which may be passed on alone."""
+    finished = {row["path"] for row in read_index(out)}
+    terms_of = {
+        out / series.folder(number): series.recipe(number).publication.terms()
+        for number in range(len(series))
+        if series.folder(number) in finished
+    }
+    if terms_of:
+        terms_of[out] = next(iter(terms_of.values()))
+    for folder, terms in terms_of.items():
+        write_card(folder, terms)
+        write_licence(folder, terms)
 
 
 def published_certificate(file: Path) -> dict[str, Any]:

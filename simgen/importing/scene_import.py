@@ -18,7 +18,7 @@ from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, va
 from simgen.importing.gltf_scene import GltfScene, Part
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_reference import reference_to
-from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
+from simgen.spec.mitsuba_file import MitsubaFile, MitsubaXml
 from simgen.spec.scene import Scene, check_unscored, names_of_objects
 
 MIN_SHEAR = 1e-5
@@ -116,7 +116,8 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
     """Make the folder of a scene that refers to a Mitsuba file, a copy with all files that it names."""
     if reference.unscored:  # Mitsuba alone knows the names of the objects
         reference_to(backend.load(), reference, path.parent)
-    names = (path.name, *files_named_by(path.parent, path.name))
+    xml = MitsubaXml(path.parent, path.name)
+    names = (path.name, *xml.files)
     scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=reference)
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
@@ -124,8 +125,8 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
         for name in names:
             (new / name).parent.mkdir(parents=True, exist_ok=True)
             (new / name).write_bytes((path.parent / name).read_bytes())
-    left_out = ("sensors but for where they stand, films, samplers and integrators: recipes have them",)
-    return ImportedScene(out, left_out, names)
+    unused = f"{shorten(', '.join(xml.unused))}: recipes have them, and of a sensor its place alone is used"
+    return ImportedScene(out, (unused,) if xml.unused else (), names)
 
 
 def _write_scene(

@@ -37,7 +37,9 @@ ALIGNMENT_BYTES = 64
 
 # A kernel with minimum, a gather and a ray: what LLVM 15 and 16 die of, and what rendering needs.
 _PROBE = """
-import sys, numpy, mitsuba as mi
+import os, sys, numpy, mitsuba as mi
+mi.file_resolver().clear()
+mi.file_resolver().append(os.path.dirname(mi.__file__))
 mi.set_variant(sys.argv[1])
 scene = mi.load_dict({
     "type": "scene",
@@ -141,11 +143,18 @@ def _mitsuba() -> Any:
     with _uninterrupted():
         import mitsuba as mi
 
+    _trust_own_files_alone(mi)
     if (threads := threads_of_worker()) is not None:
         import drjit as dr
 
         dr.set_thread_count(threads)
     return mi
+
+
+def _trust_own_files_alone(mi: Any) -> None:
+    """Let Mitsuba look for plugins, which it runs, in its package alone, not in the working directory."""
+    mi.file_resolver().clear()
+    mi.file_resolver().append(str(Path(mi.__file__).parent))
 
 
 @contextlib.contextmanager
@@ -264,7 +273,8 @@ def _trial(kind: str, library: str, name: str) -> Backend:
 
 def _probe(kind: str, library: str) -> dict[str, Any]:
     environment = os.environ | ({"DRJIT_LIBLLVM_PATH": library} if kind == "llvm" else {})
-    command = [sys.executable, "-c", _PROBE, VARIANTS[kind]]
+    # -P: no module is imported from the working directory.
+    command = [sys.executable, "-P", "-c", _PROBE, VARIANTS[kind]]
     try:
         run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S)
     except subprocess.TimeoutExpired:

@@ -6,6 +6,7 @@ What is read of it here is where its axes are (see `WorldFrame`), the names of i
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from simgen.base.strict_models import shorten, suggestion
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
 from simgen.renderer.emission import ShiningSurface, sample_light
 from simgen.renderer.mitsuba_shapes import WorldFrame, across_faces
-from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
+from simgen.spec.mitsuba_file import MitsubaFile, MitsubaXml
 from simgen.spec.scene import check_unscored, names_of_objects
 from simgen.spectral.filters import Filters
 from simgen.spectral.spectra import WAVELENGTH_NM, integral
@@ -28,6 +29,10 @@ UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """Y up and Z towards the viewer, as models stand, to Y down and Z away from the cameras."""
 BRIGHTNESS = re.compile(r"(?:radiance|irradiance|intensity)\.value|(?:sun_|sky_)?scale")
 """Parameters that say how bright a light is; pictures that shine, and lights by temperature, have none."""
+OF_RECIPES = ("Sensor", "Film", "Sampler", "ReconstructionFilter", "Integrator")
+"""What of a file is not built: recipes say how a scene is seen."""
+REQUIRED = {"bitmap": "filename", "volume": "volume", "blendbsdf": "weight"}
+"""What plugins use without a look at whether the file has it: a crash would end this process."""
 LIGHT_SAMPLES = 1 << 14
 """Directions in which each light is looked for, to measure what it gives a plane."""
 FLAT = 1e-4
@@ -69,11 +74,8 @@ class Reference:
         mi = self.mi
         config, state = _parse(mi, self.path)
         root, ids = state.root.props, iter(self.names)
-        for key, node in _children(mi, state).items():
-            if _kind(node) in ("Sensor", "Integrator"):
-                del root[key]
-            elif _is_object(node):
-                node.props.set_id(next(ids))
+        for node in filter(_is_object, _children(mi, state, state.root).values()):
+            node.props.set_id(next(ids))
         for name, plugin in own.items():
             root[name] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
             root[name].set_id(name)
@@ -116,9 +118,9 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     object.
     """
     path = folder / file.file
-    list(files_named_by(folder, file.file))  # refuses what leads outside, before Mitsuba sees the file
+    MitsubaXml(folder, file.file)  # refuses what leads outside, before Mitsuba sees the file
     _, state = _parse(mi, path)
-    shapes = filter(_is_object, _children(mi, state).values())
+    shapes = filter(_is_object, _children(mi, state, state.root).values())
     ids = [node.props.id() or Path(_properties(node).get("filename", "")).stem for node in shapes]
     has_media = any(_kind(node) == "Medium" for node in state.nodes)
     has_instances = any(node.props.plugin_name() == "instance" for node in state.nodes)
@@ -128,21 +130,57 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
 
 
 def _parse(mi: Any, path: Path) -> tuple[Any, Any]:
-    """Mitsuba's settings and tree of a file, whose own files are named by their whole paths."""
-    parser = mi.parser
+    """Mitsuba's settings and tree of a file, whose own files are named by their whole paths.
+
+    What recipes have instead is not built: it is cut off the tree, whose nodes have the sensors still. Raises
+    `InputError` for plugins and materials that Mitsuba does not ship, and for what would end this process.
+    """
+    parser, resolver = mi.parser, mi.FileResolver()
     config = parser.ParserConfig(mi.variant())
     config.merge_meshes = config.merge_equivalent = config.parallel = False
+    resolver.clear()
+    resolver.append(str(path.parent))
+    shipped = mi.file_resolver()
     try:
+        mi.set_file_resolver(resolver)  # while spectra and included files are read
         state = parser.parse_file(config, str(path))
         parser.transform_upgrade(config, state)
         parser.transform_resolve(config, state)
     except RuntimeError as fault:
         raise _refusal(path, "read", fault) from None
+    finally:
+        mi.set_file_resolver(shipped)
+    if _kind(state.root) != "Scene":
+        raise InputError(f"{path}: expected a <scene>, not a single plugin")
     for node in state.nodes:
-        name = _properties(node).get("filename")
-        if isinstance(name, str):
+        for key, child in _children(mi, state, node).items():
+            if _kind(child) in OF_RECIPES:
+                del node.props[key]
+        if _kind(node) in (*OF_RECIPES, "Scene"):
+            continue
+        values = _properties(node)
+        if fault := _fault(node.props.plugin_name(), values, Path(mi.__file__).parent):
+            raise InputError(f"{parser.file_location(state, node)}: {fault}")
+        if isinstance(name := values.get("filename"), str):
             node.props["filename"] = str((path.parent / name).resolve())
     return config, state
+
+
+def _fault(plugin: str, values: dict[str, Any], own_files: Path) -> str:
+    """What is wrong with a plugin of these parameters that Mitsuba would not say, or ""."""
+    material, needed = values.get("material", "none"), REQUIRED.get(plugin)
+    # Mitsuba would look for what it does not ship in the working directory. Its plugin for Blender reads
+    # memory at addresses that the file states.
+    if plugin not in _names_in(own_files / "plugins") - {"blender"}:
+        return f"{plugin!r} is none of Mitsuba's plugins for scene files"
+    if isinstance(material, str) and material not in _names_in(own_files / "data/ior") | {"none"}:
+        return f"{material!r} is none of Mitsuba's materials"
+    return "" if needed is None or needed in values else f"a {plugin} needs a {needed}"
+
+
+@cache
+def _names_in(folder: Path) -> frozenset[str]:
+    return frozenset(file.name.split(".")[0] for file in folder.iterdir())
 
 
 def _instantiate(mi: Any, config: Any, state: Any, path: Path) -> Any:
@@ -166,10 +204,10 @@ def _is_object(node: Any) -> bool:
     return _kind(node) == "Shape" and node.props.plugin_name() != "shapegroup"
 
 
-def _children(mi: Any, state: Any) -> dict[str, Any]:
-    """The nodes that a tree's root refers to, by key."""
+def _children(mi: Any, state: Any, node: Any) -> dict[str, Any]:
+    """The nodes of a tree that one of them refers to, by key."""
     of_kind = mi.Properties.ResolvedReference
-    values = _properties(state.root).items()
+    values = _properties(node).items()
     return {key: state.nodes[value.index()] for key, value in values if isinstance(value, of_kind)}
 
 

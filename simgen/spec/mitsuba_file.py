@@ -4,6 +4,7 @@ Mitsuba loads and runs any library that a plugin's type or a `<path>` names, so 
 looks at the file first: all that it names has to be inside the scene's folder.
 """
 
+import os
 import re
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Self
@@ -17,6 +18,10 @@ from simgen.base.strict_models import Length, Position, Strict, shown_value
 
 LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
 """Limits of all files together that make up a scene; Mitsuba's own parser has none."""
+ASCII_AND_MORE = re.compile(r"latin-?1|iso-8859-\d+|windows-125\d", re.IGNORECASE)
+"""Encodings that are read if all characters are ASCII, which are the same in UTF-8."""
+OF_RECIPES = ("sensor", "film", "sampler", "rfilter", "integrator")
+"""Elements that recipes have instead: of a sensor its place alone is used."""
 
 
 class MitsubaName(AssetName):
@@ -60,37 +65,49 @@ MitsubaScene = Annotated[
 """The same by the name of its file alone."""
 
 
-def files_named_by(folder: Path, name: str) -> list[str]:
-    """Names, relative to the folder, of the files that a Mitsuba scene `name` in it reads, itself left out.
+class MitsubaXml:
+    """What one pass over a Mitsuba scene `name` in a folder, and over what it includes, finds there.
 
-    Raises `InputError` that names file and line: for what is not XML or too large, for entities, for a
-    plugin that is no plain name, for files that are missing or outside the folder.
+    `files` are the files that it reads, itself left out, relative to the folder; `unused` is what recipes
+    have instead, with its parameters. Raises `InputError` that names file and line: for what is not XML or
+    too large, for entities, for a plugin that is no plain name, for files that are missing or outside the
+    folder.
     """
-    return list(dict.fromkeys(_XmlPass(folder).read(name)))
 
+    def __init__(self, folder: Path, name: str) -> None:
+        self._folder, self._elements, self._bytes = folder, 0, 0
+        self._defaults: dict[str, str] = {}
+        self._of_recipes: list[tuple[str, list[str]]] = []
+        self.files = tuple(dict.fromkeys(self._read(name)))
+        parts = [f"{what} ({', '.join(values)})" if values else what for what, values in self._of_recipes]
+        self.unused = tuple(dict.fromkeys(parts))
 
-class _XmlPass:
-    """One pass over a scene file and what it includes; counts elements, knows `<default>` values."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.elements, self.bytes = folder, 0, 0
-        self.defaults: dict[str, str] = {}
-
-    def read(self, name: str, depth: int = 0) -> list[str]:
-        path = asset(self.folder, name, "mitsuba")
-        self.bytes += path.stat().st_size
-        if self.bytes > LARGEST_BYTES:
+    def _read(self, name: str, folders: tuple[PurePosixPath, ...] = (), depth: int = 0) -> list[str]:
+        """Names of the files that a file names; `folders` are those of the files that include it, from the
+        last one to the first."""
+        path = asset(self._folder, name, "mitsuba")
+        self._bytes += path.stat().st_size
+        if self._bytes > LARGEST_BYTES:
             raise InputError(f"{path}: the XML of a scene may have {LARGEST_BYTES} bytes")
-        names: list[str] = []
-        parser = expat.ParserCreate()
+        names, data, parents = list[str](), path.read_bytes(), list[list[str] | None]()
+        own_folder = PurePosixPath(name).parent
+        folders = folders or (own_folder,)
+        if not _is_utf8(data):
+            raise InputError(f"{path}: the XML of a scene is text in UTF-8; save it as that")
+        parser = expat.ParserCreate("UTF-8")  # as Mitsuba has it, whatever encoding the first line states
 
         def refuse(what: str) -> None:
             raise InputError(f"{path}: line {parser.CurrentLineNumber}: {what}")
 
+        def declare(_: str, encoding: str | None, __: int) -> None:
+            stated = encoding or "UTF-8"
+            is_utf8 = stated.upper() in ("UTF-8", "US-ASCII")
+            if not (is_utf8 or (data.isascii() and ASCII_AND_MORE.fullmatch(stated))):
+                refuse(f"the encoding {shown_value(stated)} is not read; save the file as UTF-8")
+
         def start(tag: str, attributes: dict[str, str]) -> None:
-            nonlocal depth
-            depth, self.elements = depth + 1, self.elements + 1
-            if self.elements > MOST_ELEMENTS or depth > DEEPEST:
+            self._elements += 1
+            if self._elements > MOST_ELEMENTS or depth + len(parents) >= DEEPEST:
                 refuse(f"a scene may have {MOST_ELEMENTS} elements, {DEEPEST} deep")
             if tag == "path":
                 refuse("<path> is not followed; files are those of the scene's folder")
@@ -102,31 +119,54 @@ class _XmlPass:
             if not re.fullmatch(r"\w*", values.get("type", ""), re.ASCII):
                 refuse(f"{shown_value(values['type'])} is no name of a plugin")
             if tag == "default":
-                self.defaults.setdefault(values.get("name", ""), values.get("value", ""))
+                self._defaults.setdefault(values.get("name", ""), values.get("value", ""))
+            parent = parents[-1] if parents else None
+            if parent is not None and "name" in values and "value" in values:
+                parent.append(f"{values['name']} = {values['value']}")
+            parents.append([] if tag in OF_RECIPES else None)
+            if (parameters := parents[-1]) is not None:
+                self._of_recipes.append((f"{tag} {values.get('type', '')}", parameters))
             is_name = tag == "string" and values.get("name") == "filename"
-            file = values.get("filename") or (values.get("value") if is_name else None)
+            file = values.get("filename", values.get("value") if is_name else None)
             if file is None:
                 return
-            asset(self.folder, file, f"{path}: line {parser.CurrentLineNumber}")
+            if not file:
+                refuse("a file name is empty")
+            places = folders  # where Mitsuba looks for it
+            if tag == "string":
+                places = folders[-1:]
+            elif tag == "include":
+                places = own_folder, *folders
+            file = self._first(file, places)
+            asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
-                names.extend(self.read(file, depth))
+                names.extend(self._read(file, places, depth + len(parents)))
 
-        def end(_: str) -> None:
-            nonlocal depth
-            depth -= 1
-
-        parser.StartElementHandler, parser.EndElementHandler = start, end
+        parser.StartElementHandler, parser.EndElementHandler = start, lambda _: parents.pop()
         parser.StartDoctypeDeclHandler = lambda *_: refuse("a scene has no DOCTYPE and no entities")
+        parser.XmlDeclHandler = declare
         try:
-            parser.Parse(path.read_bytes(), True)
+            parser.Parse(data, True)
         except expat.ExpatError as fault:
             why = expat.ErrorString(fault.code)
             raise InputError(f"{path}: line {fault.lineno}: not valid XML: {why}") from None
         return names
 
+    def _first(self, file: str, folders: tuple[PurePosixPath, ...]) -> str:
+        """The file of that name in the first of the folders that has one."""
+        paths = [str(folder / file) for folder in folders]
+        return next((path for path in paths if os.access(self._folder / path, os.F_OK)), paths[-1])
+
     def _completed(self, value: str) -> str:
         """An attribute with the values of `<default>` in the place of their `$names`, as Mitsuba has it."""
-        for name in sorted(self.defaults, key=len, reverse=True):
-            value = value.replace(f"${name}", self.defaults[name])
+        for name in sorted(self._defaults, key=len, reverse=True):
+            value = value.replace(f"${name}", self._defaults[name])
         return value
+
+
+def _is_utf8(data: bytes) -> bool:
+    try:
+        return "\0" not in data.decode()  # which UTF-16 and UTF-32 have
+    except UnicodeDecodeError:
+        return False

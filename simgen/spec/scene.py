@@ -33,7 +33,7 @@ from simgen.base.strict_models import (
 )
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
-from simgen.spec.mitsuba_file import MitsubaScene, files_named_by
+from simgen.spec.mitsuba_file import MitsubaScene, MitsubaXml
 from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
@@ -274,5 +274,5 @@ def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
             yield f"object '{thing.name}', {where}", name
     yield from named_files(scene.model_copy(update={"objects": ()}))
     if scene.mitsuba is not None and scene.folder is not None:
-        for name in files_named_by(scene.folder, scene.mitsuba.file):
+        for name in MitsubaXml(scene.folder, scene.mitsuba.file).files:
             yield f"mitsuba, {scene.mitsuba.file}", AssetName(name)

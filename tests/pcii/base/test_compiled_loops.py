@@ -1,6 +1,9 @@
 """Loops that threads share: every index once, errors raised, and processes that were forked."""
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,3 +56,12 @@ def test_loops_run_in_a_process_that_was_forked(several_threads):
         in_threads(_add_one, 64, visits)
         os._exit(int((visits != 2).any()))
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def test_the_cache_of_compiled_code_is_not_where_the_working_directory_says(tmp_path: Path):
+    pytest.importorskip("yaml")  # with which Numba reads that file
+    (tmp_path / ".numba_config.yaml").write_text("cache_dir: planted")
+    script = "from pcii.base.compiled_loops import nb; assert nb.config.CACHE_DIR == ''"
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+    subprocess.run([sys.executable, "-P", "-c", script], cwd=tmp_path, env=environment, check=True)

@@ -56,8 +56,13 @@ def alive(processes: set[int]) -> set[int]:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_each_piece_is_done_once_and_each_process_keeps_its_copy(tmp_path: Path, workers: int) -> None:
+def test_each_piece_is_done_once_and_each_process_keeps_its_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
+) -> None:
     work = Numbers(tmp_path)
+    for name in ("multiprocessing", "pickle"):  # of a working directory that others have filled
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(1)")
+    monkeypatch.chdir(tmp_path)
     results = dict(Executor(workers).run(work, range(20)))
     assert {piece: result[0] for piece, result in results.items()} == {piece: piece for piece in range(20)}
     assert sorted(piece for piece, _ in work.begun()) == list(range(20))

@@ -12,6 +12,7 @@ from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import surface_posterior
 from pcii.depth.surface_network import NetworkOutputs, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
+from pcii.removal.methods import segment
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
@@ -237,10 +238,17 @@ def test_one_view_is_refused():
         estimate_depth(counts, (1.0, 2.0))
 
 
-def test_a_range_without_end_is_refused():
+def test_depths_that_are_too_many_or_seen_by_one_camera_are_refused():
     counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
-    with pytest.raises(InputError, match="choose a farther near end"):
+    with pytest.raises(InputError, match=r"z_range_mm: .* choose a farther near end"):
         estimate_depth(counts, (1e-6, 1.0))
+    # The disparity at z is 1 / z px, and films of 8 px have nothing in common from 8 px on.
+    estimate_depth(counts, (1 / 9, 1 / 7.9))
+    with pytest.raises(InputError, match=r"z_range_mm: up to 0.125 mm no two cameras see the same"):
+        estimate_depth(counts, (0.125 - 1e-12, 0.125))
+    for z_mm, sentence in (([1e-3], "no two cameras"), ([1e-6, 1.0], "choose a farther near end")):
+        with pytest.raises(InputError, match=f"z_mm: .*{sentence}"):
+            segment(counts, z_mm=z_mm)
 
 
 def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, monkeypatch) -> None:

@@ -221,6 +221,8 @@ def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
     [
         ([by_count, ("by_count", two_rows)], "methods: 'by_count' is there twice"),
         ([("three-step", by_count)], "methods: the name 'three-step' is taken"),
+        ([("depth:a:b", near_plane)], "methods: expected a name of letters .*, got 'a:b'"),
+        ([("(nothing)", by_count)], r"methods: expected a name of letters .*, got '\(nothing\)'"),
         (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:sweep-9"),
     ],
 )

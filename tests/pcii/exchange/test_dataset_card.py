@@ -9,9 +9,10 @@ from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, rewrite_manifest
 
 from pcii.base.errors import InputError
-from pcii.exchange.dataset_card import LICENCE, Terms, write_card
+from pcii.exchange.dataset_card import LICENCE, Terms, write_card, write_licence
 from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
+from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
 from pcii.store.verification import verify
 
 MAX_LINES = 30
@@ -39,8 +40,10 @@ def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
     write_card(root, TERMS)
     text = (root / CARD).read_text()
     assert len(text.splitlines()) <= MAX_LINES
+    write_licence(root, TERMS)
     for words in ("CC-BY-4.0", "Ada, Grace", TERMS.citation, TERMS.url):
         assert words in text
+        assert words in (root / LICENCE_FILE).read_text()
     if make is make_collection:
         assert "2 datasets, which differ in photons.budget" in text
     (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")

@@ -12,6 +12,7 @@ from small_benchmark import SCENE, written
 import pcii
 from pcii.base import command_line
 from pcii.base.errors import InputError
+from pcii.store.dataset_layout import CARD, LICENCE
 from pcii.store.folders import hash_json
 from pcii.store.verification import verify
 from simgen.app.commands import app
@@ -54,6 +55,10 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
     assert bright.views is not None
     assert not bright.has_counts
     verify(made[2])
+    folders = [made[2], *(dataset.path for dataset in collection)]
+    for file in (CARD, LICENCE):
+        assert all("CC-BY-4.0" in (folder / file).read_text() for folder in folders)
+    assert (made[2] / CARD).read_text().startswith("# two scenes\n")
 
 
 def test_making_it_in_two_steps_gives_the_published_bytes(
@@ -67,6 +72,8 @@ def test_making_it_in_two_steps_gives_the_published_bytes(
     verdict = certify(definition, file, tmp_path / "again")
     assert (verdict.compared, verdict.same_bytes, verdict.problems) == (9, 9, ())
     assert json.loads((tmp_path / "again" / CERTIFICATE).read_text())["verdict"] == verdict.sentence()
+    assert "A collection of 9 datasets" in (tmp_path / "again" / CARD).read_text()
+    verify(tmp_path / "again")
 
 
 def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Definition, Path, Path]) -> None:

@@ -105,6 +105,21 @@ def test_a_library_that_kills_its_process_does_not_kill_ours(
     assert backend.survey()[0].detail == "LLVM 20 failed: ImportError: no such library"
 
 
+@pytest.mark.renders
+def test_nothing_is_loaded_from_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mi = backend.load()
+    package = Path(mi.__file__).parent
+    assert [Path(str(folder)) for folder in mi.file_resolver()] == [package]
+    (tmp_path / "plugins").mkdir()
+    for plugin in (package / "plugins").iterdir():
+        (tmp_path / "plugins" / plugin.name).write_text("no library")
+    (tmp_path / "numpy.py").write_text("raise ImportError")
+    monkeypatch.chdir(tmp_path)
+    assert backend._probe("scalar", "") == {"works": True, "detail": "works"}
+
+
 @pytest.mark.parametrize("command", ["doctor", "generate small -o out"])
 def test_without_mitsuba_one_sentence_says_what_to_install(
     command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path

@@ -1,5 +1,6 @@
 """Scenes that refer to a Mitsuba file look as Mitsuba renders it, and read nothing outside their folder."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import simgen
 from pcii.base.errors import InputError
 from pcii.types.camera_grid import CameraGrid
 from simgen.renderer import backend
+from simgen.renderer.mitsuba_reference import reference_to
+from simgen.spec.mitsuba_file import MitsubaFile
 
 SIDE, TILES, REPEATS, SAMPLES, DEPTH = 48, 8, 6, 48, 5
 ANGLE_DEG, FOCAL_MM = 35.0, 50.0
@@ -64,6 +67,8 @@ FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"
 </medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
 <bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
 OBJ = '<shape type="obj"><string name="filename" value="%s"/></shape>'
+SURFACE = '<shape type="sphere"><bsdf type="%s">%s</bsdf></shape>'
+PICTURE = '<texture type="%s" name="reflectance"/>'
 BALL: dict[str, Any] = {
     "name": "ball",
     "position_mm": [0, 0, 3000],
@@ -181,6 +186,8 @@ def test_ids_of_the_file_and_objects_of_the_scene_do_not_mix(folder: Path) -> No
 @pytest.mark.renders
 def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
     content = '<shape type="cube" id="box"><transform name="to_world"><scale x="2"/></transform></shape>'
+    # Recipes have integrators and films: those of a file need not work here.
+    content += '<integrator type="stokes"><integrator type="elsewhere"/></integrator><film type="elsewhere"/>'
     place = {"file": "scene.xml", "place_at_mm": [0.0, 0.0, 600.0], "fit_mm": 100.0}
     scene = scene_of(folder, content, mitsuba=place, lights=[{"type": "uniform", "luminance_cd_m2": 1.0}])
     grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=50 / 575, height=121, width=121)
@@ -213,10 +220,54 @@ def test_files_that_lead_outside_are_refused(tmp_path: Path, content: str, sente
         scene_of(folder, content)
 
 
-def test_a_file_with_entities_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "scene.xml").write_text('<!DOCTYPE scene [<!ENTITY a "b">]><scene version="3.0.0"/>')
-    with pytest.raises(InputError, match="no DOCTYPE"):
+@pytest.mark.parametrize(
+    ("head", "encoding", "sentence"),
+    [
+        ('<!DOCTYPE scene [<!ENTITY a "b">]>', "ascii", "no DOCTYPE"),
+        ("<!--\u00e4-->", "utf-8-sig", ""),
+        ('<?xml version="1.0" encoding="utf-8"?><!--\u00e4-->', "utf-8", ""),
+        ('<?xml version="1.0" encoding="ISO-8859-1"?>', "ascii", ""),
+        ('<?xml version="1.0" encoding="ISO-8859-1"?><!--\u00e4-->', "utf-8", "encoding 'ISO-8859-1'"),
+        ('<?xml version="1.0" encoding="UTF-7"?>', "ascii", "encoding 'UTF-7'"),
+        ("<!--\u00e4-->", "latin-1", "UTF-8"),
+        ("", "utf-16", "UTF-8"),
+        ("", "utf-16-le", "UTF-8"),
+        ("", "cp037", "UTF-8"),
+    ],
+)
+def test_only_what_every_parser_reads_alike_is_read(
+    tmp_path: Path, head: str, encoding: str, sentence: str
+) -> None:
+    (tmp_path / "scene.xml").write_text(head + '<scene version="3.0.0"/>', encoding)
+    with pytest.raises(InputError, match=sentence) if sentence else contextlib.nullcontext():
         simgen.load_scene({"title": "x", "mitsuba": "scene.xml"}, folder=tmp_path)
+
+
+@pytest.mark.renders
+def test_names_of_files_are_looked_up_as_mitsuba_does_but_never_in_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An included file is first looked for beside the file that includes it, a mesh beside the first file."""
+    folder, elsewhere = tmp_path / "scene", tmp_path / "elsewhere"
+    light = '<emitter type="point"><spectrum name="intensity" filename="%s"/></emitter>'
+    written = {
+        "scene.xml": CAMERA + light % "s.spd" + '<include filename="part/a.xml"/>',
+        "part/a.xml": '<include filename="b.xml"/>',
+        "part/b.xml": OBJ % "m.obj" + light % "d.spd",
+        "b.xml": '<shape type="sphere" id="wrong"/>',
+    }
+    for name, content in written.items():
+        written[name] = f'<scene version="3.0.0">{content}</scene>'
+    written |= dict.fromkeys(["s.spd", "part/d.spd"], "400 1\n700 1\n") | {"part/m.obj": "not this one"}
+    written["m.obj"] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"
+    for name, content in written.items():
+        for place, text in ((folder, content), (elsewhere, "not this one")):
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_text(text)
+    monkeypatch.chdir(elsewhere)
+    assert reference_to(backend.load(), MitsubaFile(file="scene.xml"), folder).names == ("m",)
+    imported = simgen.import_scene(folder / "scene.xml", tmp_path / "copy")
+    assert imported.files == ("scene.xml", "s.spd", "part/a.xml", "part/b.xml", "m.obj", "part/d.spd")
 
 
 @pytest.mark.renders
@@ -224,7 +275,13 @@ def test_what_mitsuba_refuses_is_one_sentence(tmp_path: Path) -> None:
     wrong = '<shape type="sphere"><float name="radios" value="1"/></shape>'
     for content, sentence in (
         (CAMERA + wrong, "radios"),
-        (CAMERA + '<shape type="spher"/>', "spher"),
+        (CAMERA + '<shape type="spher"/>', "'spher' is none of Mitsuba's plugins"),
+        (CAMERA + '<shape type="blender"/>', "'blender' is none of Mitsuba's plugins"),
+        (CAMERA + SURFACE % ("conductor", '<string name="material" value="Xx"/>'), "'Xx' is none"),
+        # These three end the process otherwise.
+        (CAMERA + SURFACE % ("blendbsdf", ""), "a blendbsdf needs a weight"),
+        (CAMERA + SURFACE % ("diffuse", PICTURE % "bitmap"), "a bitmap needs a filename"),
+        (CAMERA + SURFACE % ("diffuse", PICTURE % "volume"), "a volume needs a volume"),
         ("<shape/>", "cannot read"),
         (ROOM, "it has 0 sensors; give mitsuba.camera"),
     ):
@@ -240,6 +297,9 @@ def test_an_import_copies_what_the_file_names(folder: Path) -> None:
         simgen.import_scene(folder / "scene.xml", folder / "copy", unscored=["table"], **place)
     imported = simgen.import_scene(folder / "scene.xml", folder / "copy", unscored=["floor", "back"], **place)
     assert imported.files == ("scene.xml", "picture.png")
+    assert imported.left_out[0].startswith(
+        "sensor perspective (fov = 35.0), film hdrfilm (width = 48, height"
+    )
     scene = simgen.load_scene(folder / "copy")
     assert scene.mitsuba is not None
     assert (scene.mitsuba.unit_mm, scene.mitsuba.fit_mm) == (1.0, 200.0)
