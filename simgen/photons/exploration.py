@@ -169,7 +169,8 @@ def _send_pilot(
     rays = int(np.clip(RAYS_PER_PHOTON * photons / sampler.paths_each, FIRST_RAYS, MAX_RAYS))
     followed = int(FOLLOWED_SHARE * rays)
     film_light = float(mean.mean()) * setup.grid.height * setup.grid.width + direct
-    found, lit = _meet_bright_light(sampler, first, first.k.size + followed, film_light, emission)
+    known_paths = first.k.size + followed, int(photons / KEPT_SHARE_GUESS)
+    found, lit = _meet_bright_light(sampler, first, known_paths, film_light, emission)
     found = replace(found, ambient=ambient, paths=paths)
     if found.image_cells is not None:  # without the light of these
         setup = replace(setup, image_cells=found.image_cells)
@@ -197,23 +198,29 @@ def _send_pilot(
 
 
 def _meet_bright_light(
-    sampler: CandidateSampler, first: Samples, paths: int, film_light: float, emission: EmissionSampler
+    sampler: CandidateSampler,
+    first: Samples,
+    known_paths: tuple[int, int],
+    film_light: float,
+    emission: EmissionSampler,
 ) -> tuple[Exploration, Samples]:
-    """What is known of bright light that so many `paths` may not meet, without a majorant yet; and paths to
-    what is lit brightly.
+    """What is known of bright light that few paths meet, without a majorant yet; and paths to what is lit
+    brightly.
 
-    `first` are paths that are spread evenly, `film_light` is the sum of radiance over a film. Images of
-    lamps are drawn apart, where a compiled backend runs. What is not found there as it is sent, and matters,
-    is `unmet`.
+    `first` are paths that are spread evenly, `known_paths` the numbers of those of the pilot and of a
+    rehearsal, which look for all light that surfaces scatter, `film_light` is the sum of radiance over a
+    film. Images of lamps are drawn apart, where a compiled backend runs. What is not found there as it is
+    sent, and matters, is `unmet`.
     """
-    setup = sampler.setup
+    setup, paths = sampler.setup, known_paths[0]
     lit, traced = lit_light(setup, sampler, film_light, paths)
     mirrored = mirrored_light(setup, film_light, paths, first.z_mm, with_straight=False)
     film_light += sum(light.light for light in lit + mirrored)
     pixels, images = setup.grid.height * setup.grid.width, None
-    is_sure = [light.hits(paths, pixels) >= SURE_HITS for light in mirrored]
-    seen = [row for row, sure in zip(mirrored, is_sure, strict=True) if not sure and row.arrivals is not None]
-    unmet = [row for row, sure in zip(mirrored, is_sure, strict=True) if not sure and row.arrivals is None]
+    is_rare = {True: paths, False: sum(known_paths)}  # by whether mirrors alone send it
+    rare = [row for row in mirrored if row.hits(is_rare[row.arrivals is not None], pixels) < SURE_HITS]
+    seen = [row for row in rare if row.arrivals is not None]
+    unmet = [row for row in rare if row.arrivals is None]
     if seen and isinstance(sampler, WavefrontSampler):
         images = find_images(sampler, seen)
     known = KnownPlaces([emission] if images is None else [emission, images])

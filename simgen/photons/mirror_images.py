@@ -26,11 +26,11 @@ REWEIGHTED = 4
 """Rounds of the fit by which arrivals that do not belong to the main image lose their weight."""
 MIN_SPREAD_PX = 0.5
 """Least standard deviation of the first paths around these places."""
-FIRST_HITS = 1000.0
+FIRST_HITS = 300.0
 """First paths that are to meet the images in each view: many, as curved glass has faint ones beside the main
 one, within the ends of `FIRST_PATHS` for all views."""
 FIRST_PATHS = 1 << 14, 1 << 21
-MORE_PATHS = 1 << 18
+MORE_PATHS = 1 << 17
 """Paths around those that have met an image: what cells they meet is what is drawn from."""
 CELLS_ACROSS = 4.0
 """Cells along an image. More: fewer candidates for each photon, but more paths to find all cells."""

@@ -93,8 +93,11 @@ class LampTracer:
     def lamps(self) -> list[Any]:
         """The emitters of Mitsuba's scene that a path from a camera may meet: surfaces and surroundings."""
         mi, scene = self.render_scene.mi, self.render_scene.scene
-        kinds = mi.EmitterFlags.Surface, mi.EmitterFlags.Infinite
-        return [lamp for lamp in scene.emitters() if any(mi.has_flag(lamp.flags(), kind) for kind in kinds)]
+        return [
+            lamp
+            for lamp in scene.emitters()
+            if lamp.is_environment() or mi.has_flag(lamp.flags(), mi.EmitterFlags.Surface)
+        ]
 
     @cached_property
     def has_mirrors(self) -> bool:
