@@ -21,13 +21,11 @@ from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
 from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned
 from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
+from simgen.renderer.random_numbers import RandomNumbers, streams_for
 from simgen.renderer.wavelengths import light_of, of_colour
 from simgen.sensor.photon_table import PhotonTable
 
 LEAST_GUESS = 1e-30
-PATH_SEED_MASK = 0x9E3779B9
-"""Flips 20 of the 32 bits (2^32 over the golden ratio, which has no pattern) of the seed that candidates are
-drawn with: their paths get random numbers of their own."""
 
 
 class WavefrontSampler(CandidateSampler):
@@ -80,7 +78,7 @@ class WavefrontSampler(CandidateSampler):
         setup, mi, dr = self.setup, self.mi, self.dr
         if group.size == 0:
             return nothing(setup.channels)
-        sampler = self._sampler(seed, group.size)
+        sampler = streams_for(mi, seed, group.size)
         candidates = self._draw(sampler, unsigned(mi, group), view)
         first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
         where = candidates.entry * setup.channels + candidates.colour
@@ -97,7 +95,7 @@ class WavefrontSampler(CandidateSampler):
         if len(rest) == 0:
             return nothing(setup.channels)
         candidates, first = _take(candidates, rest), _take_hits(first, rest)
-        light = self._follow(candidates, first, seed)
+        light = self._follow(candidates, first, seed, 0)
         most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
         radiance = self._in_own_colour(light, candidates)
         is_kept = dr.gather(mi.Float, chance, rest) * (most - floor) < radiance - floor
@@ -119,7 +117,7 @@ class WavefrontSampler(CandidateSampler):
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         mi, dr = self.mi, self.dr
-        candidates = self._at(self._sampler(seed, points.view.size), points)
+        candidates = self._at(streams_for(mi, seed, points.view.size), points)
         some = dr.arange(mi.UInt32, min(follow, points.view.size))
         guess, light = [0.0] * self.setup.channels, [0.0] * self.setup.channels
         z_mm = None
@@ -127,7 +125,7 @@ class WavefrontSampler(CandidateSampler):
             recoloured = candidates._replace(colour=colour)
             first = self._hit_first(recoloured)
             followed, first_of_followed = _take(recoloured, some), _take_hits(first, some)
-            radiance = self._follow(followed, first_of_followed, seed + turn)
+            radiance = self._follow(followed, first_of_followed, seed, turn)
             self._require_finite(dr.sum(radiance), first_of_followed)
             guess = [a + b for a, b in zip(guess, self._per_colour(first.guess, recoloured), strict=True)]
             light = [a + b for a, b in zip(light, self._per_colour(radiance, followed), strict=True)]
@@ -142,12 +140,7 @@ class WavefrontSampler(CandidateSampler):
             return floats(self.mi, nowhere), floats(self.mi, nowhere)
         return floats(self.mi, majorant.bound), floats(self.mi, majorant.radiance_ratio_bound)
 
-    def _sampler(self, seed: int, size: int) -> Any:
-        sampler = self.mi.load_dict({"type": "independent"})
-        sampler.seed(seed, size)
-        return sampler
-
-    def _draw(self, sampler: Any, group: Any, view_numbers: np.ndarray | None) -> Candidates:
+    def _draw(self, sampler: RandomNumbers, group: Any, view_numbers: np.ndarray | None) -> Candidates:
         """One candidate for each of these groups: tile and cell by the bound, the rest evenly."""
         mi, dr, grid = self.mi, self.dr, self.setup.grid
         if view_numbers is None:
@@ -185,7 +178,7 @@ class WavefrontSampler(CandidateSampler):
             k, l, row, col, row_px, col_px, entry, colour, inside, lens_point, wavelength_sample
         )
 
-    def _at(self, sampler: Any, points: FilmPoints) -> Candidates:
+    def _at(self, sampler: RandomNumbers, points: FilmPoints) -> Candidates:
         """Candidates of no entry at these points."""
         mi, dr, number = self.mi, self.dr, points.view.size
         k, l = np.divmod(points.view, self.setup.grid.cols)
@@ -203,7 +196,7 @@ class WavefrontSampler(CandidateSampler):
             wavelength_sample=wavelength_sample,
         )
 
-    def _lens_point(self, sampler: Any) -> Any:
+    def _lens_point(self, sampler: RandomNumbers) -> Any:
         lens = self.setup.rig.lens
         if lens is None:
             return None
@@ -251,11 +244,11 @@ class WavefrontSampler(CandidateSampler):
         self.dr.eval(vars(first))
         return first
 
-    def _follow(self, candidates: Candidates, first: FirstHits, seed: int) -> Any:
-        """Radiance along one path from each first hit, as rays carry it."""
+    def _follow(self, candidates: Candidates, first: FirstHits, seed: int, turn: int) -> Any:
+        """Radiance along one path from each first hit, as rays carry it; each `turn` has other numbers."""
         self.dr.make_opaque(*candidates, vars(first))
         # Not the candidates' numbers, which decided which of them are followed.
-        sampler = self._sampler(seed ^ PATH_SEED_MASK, len(candidates.k))
+        sampler = streams_for(self.mi, seed, len(candidates.k), part=1 + turn)
         rays, longest = self._rays(candidates), self.setup.max_depth
         light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest)
         self.dr.eval(light)
