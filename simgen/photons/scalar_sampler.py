@@ -36,7 +36,7 @@ class ScalarSampler(CandidateSampler):
         candidates, candidate = _take(candidates, followed), candidate[followed]
         object_id, z_mm = object_id[followed], z_mm[followed]
         light = self._follow(candidates, rng)
-        self.require_finite(light.sum(axis=1), object_id)
+        self.require_finite(light.sum(axis=1), candidates, object_id)
         own, place = light[np.arange(len(light)), candidates.colour], (candidates.entry, candidates.colour)
         bound = self.majorant.bound[place]
         floor = 0.0 if self.below is None else self.below.bound[place]
@@ -65,7 +65,7 @@ class ScalarSampler(CandidateSampler):
             turns = [candidates._replace(colour=np.full_like(colour, c)) for c in range(self.setup.channels)]
             light = np.sum([self._follow(one, rng) for one in turns], axis=0)
         object_id, z_mm = self._first_hits(candidates)
-        self.require_finite(light.sum(axis=1), object_id)
+        self.require_finite(light.sum(axis=1), candidates, object_id)
         return self._samples(candidates, z_mm, light)
 
     def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> Candidates:

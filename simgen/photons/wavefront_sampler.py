@@ -105,7 +105,7 @@ class WavefrontSampler(CandidateSampler):
         photon, hit = _take(candidates, kept), _take_hits(first, kept)
         candidate = dr.gather(mi.UInt32, rest, kept)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
-        self._require_finite(ratio, first)
+        self._require_finite(ratio, candidates, first)
         exceeding = nothing(setup.channels).exceeding
         if len(over):
             exceeding = self._exceeding(candidates, first, light, over)
@@ -126,7 +126,7 @@ class WavefrontSampler(CandidateSampler):
             first = self._hit_first(recoloured)
             followed, first_of_followed = _take(recoloured, some), _take_hits(first, some)
             radiance = self._follow(followed, first_of_followed, seed, turn)
-            self._require_finite(dr.sum(radiance), first_of_followed)
+            self._require_finite(dr.sum(radiance), followed, first_of_followed)
             guess = [a + b for a, b in zip(guess, self._per_colour(first.guess, recoloured), strict=True)]
             light = [a + b for a, b in zip(light, self._per_colour(radiance, followed), strict=True)]
             dr.eval(guess, light)
@@ -259,10 +259,11 @@ class WavefrontSampler(CandidateSampler):
         ray = film_rays(self.setup.render_scene, self.setup.rig, *at)
         return self.light.aim(ray, candidates.colour, candidates.wavelength_sample)
 
-    def _require_finite(self, radiance: Any, first: FirstHits) -> None:
+    def _require_finite(self, radiance: Any, candidates: Candidates, first: FirstHits) -> None:
         values = np.array(radiance)
         if not np.isfinite(values).all():
-            self.require_finite(values, self.setup.render_scene.object_of_shape[np.array(first.shape)])
+            object_id = self.setup.render_scene.object_of_shape[np.array(first.shape)]
+            self.require_finite(values, candidates, object_id)
 
     def _per_colour(self, radiance: Any, candidates: Candidates) -> list[Any]:
         """Radiance that rays carry in each colour of the sensor."""

@@ -83,6 +83,11 @@ def render_view(
     for rows, cols in windows:
         part = camera.of_window(rows, cols)
         image[rows, cols] = _mean_of_paths(render_scene, part, sampler, samples_per_pixel, rng)
+    wrong = np.argwhere(~np.isfinite(image).all(axis=2))
+    if wrong.size:
+        row, col = wrong[0].tolist()
+        number = int(first_objects(render_scene, camera.position_mm, camera.towards(*wrong[:1].T))[0])
+        raise InputError(not_finite(render_scene, number, (k, l), (row, col), camera.grid))
     return image
 
 
@@ -104,11 +109,6 @@ def _mean_of_paths(
         while rest >= part:
             seed = int(rng.integers(1 << 32))
             image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=part, seed=seed))
-            is_finite = np.isfinite(image).all(axis=2)
-            if not is_finite.all():
-                towards = camera.towards(*np.argwhere(~is_finite)[:1].T)
-                number = first_objects(render_scene, camera.position_mm, towards)[0]
-                raise InputError(not_finite(render_scene, int(number)))
             if part == samples:
                 return image
             total = total + part * image.astype(np.float64)
