@@ -191,8 +191,10 @@ class CandidateSampler(ABC):
         """Light paths of `candidates`, of which `followed` go on beyond their first hit."""
         return candidates + (self.paths_each - 1) * followed
 
-    def require_finite(self, radiance: np.ndarray, object_id: np.ndarray) -> None:
-        """`InputError` for radiance (N,) that is no finite number, with the object (N,) that was seen."""
+    def require_finite(self, radiance: np.ndarray, candidates: Candidates, object_id: np.ndarray) -> None:
+        """`InputError` for radiance (N,) of candidates, which see objects (N,), that is no finite number."""
         wrong = np.flatnonzero(~np.isfinite(radiance))
         if wrong.size:
-            raise InputError(not_finite(self.setup.render_scene, int(object_id[wrong[0]])))
+            k, l, row, col = (int(np.array(part)[wrong[0]]) for part in candidates[:4])
+            scene, number = self.setup.render_scene, int(object_id[wrong[0]])
+            raise InputError(not_finite(scene, number, (k, l), (row, col), self.setup.grid))

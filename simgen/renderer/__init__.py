@@ -10,5 +10,6 @@ mitsuba_shapes    Where things stand in the renderer's axes, and their shapes.
 mitsuba_surfaces  Materials as Mitsuba's surfaces, colours and spectra as its textures.
 path_tracing      Camera rays and light paths, many at once: what is hit first, and unbiased radiance.
 radiance          Dense radiance of one view: cameras as Mitsuba's sensors, every pixel by path tracing.
+random_numbers    Random numbers of light paths: a stream in each lane, of a seed of any size.
 wavelengths       How rays carry light: as three colours, or as four wavelengths for a pixel's filter.
 """

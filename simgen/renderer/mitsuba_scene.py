@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.types.camera_grid import CameraGrid
 from simgen.assets.asset_files import Assets, read_assets
 from simgen.assets.triangles import triangles_of
 from simgen.renderer import emission
@@ -172,8 +173,15 @@ def shape_number(render_scene: RenderScene, hit: Any) -> Any:
     return dr.select(instance != 0, instance, number)
 
 
-def not_finite(render_scene: RenderScene, number: int) -> str:
-    """The sentence for light of an object (0: none) that is no finite number."""
+def not_finite(
+    render_scene: RenderScene, number: int, view: tuple[int, int], pixel: tuple[int, int], grid: CameraGrid
+) -> str:
+    """The sentence for light of an object (0: none) in a pixel of a view that is no finite number."""
     name = render_scene.names.get(number)
     what = "what is seen beside the objects" if name is None else f"object '{name}'"
-    return f"{what}: its radiance is not a finite number; make tiny lamps larger, or move them away from it"
+    # The size tells views of the dataset from the coarse ones that are looked at before.
+    where = f"row {pixel[0]}, column {pixel[1]} of view {view}, of {grid.height} x {grid.width} px"
+    return (
+        f"{what}: its radiance in {where}, is not a finite number; make tiny lamps larger, or move them away "
+        "from it"
+    )

@@ -313,5 +313,9 @@ class _Tracer:
 
 
 def _power_heuristic(pdf: Any, other: Any) -> Any:
-    """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
-    return pdf * pdf / (pdf * pdf + other * other)
+    """Weight of a sample that two ways could have given: the power heuristic with exponent 2.
+
+    Of the ratio, since the square of a density has no room in single precision where a lamp is met edge-on.
+    """
+    ratio = other / pdf
+    return 1 / (1 + ratio * ratio)

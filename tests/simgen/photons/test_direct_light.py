@@ -260,5 +260,5 @@ def test_radiance_that_is_no_number_is_refused_with_the_object(monkeypatch: pyte
         return light * float("nan") if COMPILED else np.full_like(light, np.nan)
 
     monkeypatch.setattr(module, "_follow", broken)
-    with pytest.raises(InputError, match=r"^object 'wall': its radiance is not a finite number"):
+    with pytest.raises(InputError, match=r"^object 'wall': its radiance in row \d+, column \d+ of view \(\d"):
         explore(setup, Photons(budget=100))
