@@ -172,6 +172,8 @@ def lit_light(
         scale_px = setup.grid.focal_mm / setup.grid.pixel_mm
         image_px = np.nan_to_num(places.area_mm2 * scale_px**2 * slope / z_mm**3)
         here = np.flatnonzero(is_on_film(setup.grid, row + 0.5, col + 0.5) & (image_px > 0))
+        if not here.size:
+            continue
         points = FilmPoints(view[here], row[here] + 0.5, col[here] + 0.5)
         traced = sampler.trace(points, here.size, seeds.integer(SEED, stage="lamp rays", part=1))
         # What stands before a place has another depth.

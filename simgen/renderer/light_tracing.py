@@ -18,6 +18,9 @@ from simgen.renderer.backend import is_scalar, load_drjit, vectors
 from simgen.renderer.intersection import objects_by_shape
 from simgen.renderer.mitsuba_scene import RenderScene, shape_number
 
+BEGIN_SHARE = 2e-4
+"""Light begins this share of a lamp's distance from the cameras away from its surface. Larger: what touches a
+lamp is passed over. Smaller: in single precision a small ball stands in its own light."""
 MIDDLE_NM = 560.0
 """Wavelength at which the geometry of lamps is looked at in spectral mode."""
 
@@ -151,6 +154,11 @@ class LampTracer:
         return Arrivals(*map(np.concatenate, zip(*arrivals, strict=True))), float(brightest)
 
     @cached_property
+    def _middle(self) -> list[float]:
+        """Where the cameras' world begins, in the renderer's axes and unit."""
+        return self.render_scene.frame.points(np.zeros(3)).tolist()
+
+    @cached_property
     def _light_per_power(self) -> float:
         """Light on a film per power that passes the disc along the axis."""
         scale_px = self.rig.grid.focal_mm / self.rig.grid.pixel_mm
@@ -207,8 +215,8 @@ class LampTracer:
     def _leave(
         self, lamp: np.ndarray, rng: np.random.Generator
     ) -> tuple[_Rays, np.ndarray, np.ndarray, np.ndarray]:
-        """A ray from a point of each lamp (N,), drawn by brightness; the share (N, S) of its power that a pixel
-        of a random colour sees, the radiance (N,) of the point as it sees it, and its largest part (N,)."""
+        """A ray from a point of each lamp (N,), drawn by brightness; how much of its power a pixel of a
+        random colour sees (N, S), the radiance (N,) of the point as it sees it, and its largest part."""
         filters, number = self.render_scene.filters, lamp.size
         wavelength_nm, weight = np.zeros((number, 0)), np.eye(3)[rng.integers(0, 3, number)]
         if filters is not None:
@@ -232,12 +240,16 @@ class LampTracer:
         """Origin, direction, power and radiance of a ray that leaves a surface."""
         mi = self.render_scene.mi
         place, area = lamp.sample_position(0.0, mi.Point2f(numbers[0], numbers[1]))
+        if lamp.get_shape().class_name() == "Sphere":  # of a turned one Mitsuba has another place's normal
+            place.n = load_drjit().normalize(mi.Normal3f(place.p - lamp.get_shape().bbox().center()))
         start = mi.SurfaceInteraction3f(place, wavelengths)
         start.wi = [0.0, 0.0, 1.0]
         radiance = lamp.eval(start)
         away = mi.warp.square_to_cosine_hemisphere(mi.Point2f(numbers[2], numbers[3]))
         ray = start.spawn_ray(start.to_world(away))
-        return ray.o, ray.d, radiance * (area * np.pi), radiance
+        # A ray that begins nearer to a small ball would hit it, for rounding.
+        ahead = BEGIN_SHARE * load_drjit().norm(ray.o - mi.Point3f(*self._middle))
+        return ray.o + ahead * ray.d, ray.d, radiance * (area * np.pi), radiance
 
     def _leave_around(self, lamp: Any, numbers: Any, wavelengths: Any) -> tuple[Any, ...]:
         """The same of one that comes from all around, from a disc as wide as the scene."""

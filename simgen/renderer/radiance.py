@@ -97,6 +97,8 @@ def _mean_of_paths(
     """The film of a camera, (H, W, C) float32; each part of its samples has its own seed."""
     mi = render_scene.mi
     plugin = sensor_plugin(mi, camera, sampler, render_scene.frame)
+    if render_scene.medium is not None:
+        plugin["medium"] = render_scene.medium
     if render_scene.filters is not None:
         # A channel for each colour's sensitivity, instead of R, G, B.
         del plugin["film"]["pixel_format"]
