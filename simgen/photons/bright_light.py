@@ -51,13 +51,15 @@ STRAIGHT_POINTS = 1 << 13
 class BrightLight(NamedTuple):
     """Light of one `radiance`: `what` holds it, and what it adds to the sum of radiance over a film's pixels.
 
-    `arrivals` are where it was seen to come from, if mirrors or glass alone send it to the cameras.
+    `arrivals` are where it was seen to come from, if mirrors or glass alone send it to the cameras: as many
+    `bounces` of them.
     """
 
     what: str
     light: float
     radiance: float
     arrivals: Arrivals | None = None
+    bounces: int = 0
 
     @classmethod
     def of(cls, what: str, light: np.ndarray, radiance: np.ndarray) -> "BrightLight":
@@ -97,7 +99,7 @@ def straight_light(setup: Setup) -> list[BrightLight]:
     rng = seeds.generator(SEED, stage="aimed pilot", part=2)
     arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % setup.grid.view_count, rng)
     light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
-    rows = _rows(arriving.surface, light, arriving.radiance)
+    rows = _rows(arriving.surface[None], light, arriving.radiance)
     names = [_name(setup, number) for number in emission.numbers.tolist()]
     return [
         BrightLight.of(names[arriving.surface[row[0]]], light[row], arriving.radiance[row]) for row in rows
@@ -145,13 +147,14 @@ def mirrored_light(
     arrivals, result = arrivals._replace(light=light), []
     if light.sum() <= LEAST_SHARE * film_light:
         return []
-    for row in _rows(arrivals.lamp * 2 + arrivals.is_scattered, light, arrivals.radiance):
-        own = arrivals.take(row)
-        name = _name(setup, tracer.objects[own.lamp[0]])
+    kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
+    for row in _rows(kinds, light, arrivals.radiance):
+        own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
+        name = _name(setup, tracer.objects[lamp])
         if own.bounces.any():
             name += " through " + _name(setup, int(np.bincount(own.object_id).argmax()))
-        seen = None if own.is_scattered[0] else own
-        result.append(BrightLight.of(name, own.light, own.radiance)._replace(arrivals=seen))
+        seen = BrightLight.of(name, own.light, own.radiance)
+        result.append(seen if is_scattered else seen._replace(arrivals=own, bounces=bounces))
     return result
 
 
@@ -188,11 +191,11 @@ def lit_light(
     return rows, Samples.joined(seen)
 
 
-def _rows(group: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:
-    """Indices of what is of one group and of one octave of radiance."""
+def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:
+    """Indices of what is of the same kinds (K, N) and of one octave of radiance (N,)."""
     octave = np.floor(np.log2(np.maximum(radiance, np.finfo(float).tiny))).astype(np.int64)
-    _, row = np.unique(np.stack([group, octave]), axis=1, return_inverse=True)
-    return (np.flatnonzero(row == number) for number in range(row.max(initial=-1) + 1))
+    _, row = np.unique(np.concatenate([kinds, octave[None]]), axis=1, return_inverse=True)
+    return (np.flatnonzero(row.ravel() == number) for number in range(row.max(initial=-1) + 1))
 
 
 def _name(setup: Setup, number: int) -> str:

@@ -14,7 +14,6 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.photons.bright_light import (
-    KNOWN_TO,
     LEAST_SHARE,
     SURE_HITS,
     BrightLight,
@@ -85,6 +84,11 @@ EXCESS_SHARE = 1e-5
 KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
 MIN_KEPT_SHARE = 1e-4
+MIN_FOUND_SHARE = 0.5
+"""Images in so many mirrors count as found if paths of the cameras find this share of what lamps send."""
+MAX_HIDDEN_SHARE = LEAST_SHARE / 4
+"""Share of a film's light that may be in images that were not found: curved glass gathers them, so that one
+camera gets several times the mean of the disc."""
 RARE = "light in rare paths, as by mirrors,"
 """What rehearsals find above the bounds, whatever it is."""
 
@@ -224,11 +228,16 @@ def _meet_bright_light(
     if seen and isinstance(sampler, WavefrontSampler):
         images = find_images(sampler, seen)
     known = KnownPlaces([emission] if images is None else [emission, images])
-    found = 0.0 if images is None else images.mass * _kept_share(setup, images)
-    sent = sum(row.light for row in seen)
-    missing = sent - KNOWN_TO * film_light - found
-    if missing > 0:
-        unmet += [row._replace(light=row.light * missing / sent) for row in seen]
+    if images is None:
+        unmet += seen
+    else:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=1 << 20)
+        found = images.light_by_bounces(AIMED_RAYS, path_seed)
+        sent = np.bincount([row.bounces for row in seen], [row.light for row in seen], minlength=found.size)
+        # What the cameras see of a lamp differs from what arrives around them, but not by a half.
+        hidden = [row for row in seen if found[row.bounces] < MIN_FOUND_SHARE * sent[row.bounces]]
+        if sum(row.light for row in hidden) > MAX_HIDDEN_SHARE * film_light:
+            return Exploration(None, known, np.zeros(setup.channels), 0, unmet=tuple(hidden)), traced
     if sum(row.light for row in unmet) <= LEAST_SHARE * film_light:
         unmet = []
     cells = None if images is None else images.cells

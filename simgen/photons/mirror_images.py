@@ -65,22 +65,13 @@ class MirrorImages:
 
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
-        rng, per_px = np.random.default_rng(seed), self.cells.per_px
-        # Views with less than the most have candidates that belong to no cell.
-        target = self.of_view[view] + rng.random(view.size) * self.mass
-        candidate = np.flatnonzero(target < self.of_view[view + 1])
-        cell = np.searchsorted(self.running, target[candidate], side="right") - 1
-        cell = np.clip(cell, 0, self.bound.size - 1)
-        across = self.grid.width * per_px
-        line, col = np.divmod(self.cells.number[cell].astype(np.int64), across)
-        down, right = rng.random((2, cell.size))
-        row = (line % (self.grid.height * per_px) + down) / per_px
-        points = FilmPoints(view[candidate], row, (col + right) / per_px)
+        rng = np.random.default_rng(seed)
+        points, candidate, cell = self._draw(view, rng)
         is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
         bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
         here = is_of_group[group[candidate], bayer]
         points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
-        radiance, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
+        radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
         number = np.floor(radiance / self.bound[cell] + rng.random(cell.size)).astype(np.int64)
         k, l = np.divmod(points.view, self.grid.cols)
@@ -89,6 +80,27 @@ class MirrorImages:
         photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
         accepted = nothing(self.sampler.setup.channels)
         return accepted._replace(photons=photons, candidate=candidate.repeat(number))
+
+    def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
+        """Light of a film, mean of all views, by the number of mirrors before it, of `number` candidates."""
+        view = np.arange(number) % self.grid.view_count
+        points, _, cell = self._draw(view, np.random.default_rng(seed))
+        radiance, bounces, _, _ = self.sampler.trace_mirrored(points, self.cells.above, seed)
+        light = radiance / self.bound[cell] * (self.mass / number)
+        return np.bincount(bounces, light, minlength=self.sampler.setup.max_depth + 1)
+
+    def _draw(self, view: np.ndarray, rng: np.random.Generator) -> tuple[FilmPoints, np.ndarray, np.ndarray]:
+        """Points of the films of `view` (N,), fewer than these: with the number of each and its cell."""
+        per_px = self.cells.per_px
+        # Views with less than the most have candidates that belong to no cell.
+        target = self.of_view[view] + rng.random(view.size) * self.mass
+        candidate = np.flatnonzero(target < self.of_view[view + 1])
+        cell = np.searchsorted(self.running, target[candidate], side="right") - 1
+        cell = np.clip(cell, 0, self.bound.size - 1)
+        line, col = np.divmod(self.cells.number[cell].astype(np.int64), self.grid.width * per_px)
+        down, right = rng.random((2, cell.size))
+        row = (line % (self.grid.height * per_px) + down) / per_px
+        return FilmPoints(view[candidate], row, (col + right) / per_px), candidate, cell
 
 
 class KnownPlaces:
@@ -130,7 +142,7 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
         seed = seeds.integer(SEED, stage="lamp rays", part=part)
         if not points.view.size:
             return points, np.zeros(0)
-        brought, _, _ = sampler.trace_mirrored(points, above, seed)
+        brought, *_ = sampler.trace_mirrored(points, above, seed)
         return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
 
     for number, light in enumerate(lights):

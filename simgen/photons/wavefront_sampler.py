@@ -135,10 +135,11 @@ class WavefrontSampler(CandidateSampler):
 
     def trace_mirrored(
         self, points: FilmPoints, above: float, seed: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What is brighter than `above` and seen by mirrors alone through these points of films (N,).
 
-        Its radiance (N,) in each pixel's own colour, and the object and depth of the first hit.
+        Its radiance (N,) in each pixel's own colour and the number of mirrors before it; and the object and
+        depth of the first hit.
         """
         mi, setup = self.mi, self.setup
         candidates = self._at(streams_for(mi, seed, points.view.size), points)
@@ -146,9 +147,11 @@ class WavefrontSampler(CandidateSampler):
         self.dr.make_opaque(*candidates, vars(first))
         sampler = streams_for(mi, seed, points.view.size, part=1)
         path = self._rays(candidates), first.record, sampler, setup.max_depth, opaque(mi.Float, above)
-        radiance = self._in_own_colour(mirrored_radiance(setup.render_scene, *path), candidates)
+        light, bounces = mirrored_radiance(setup.render_scene, *path)
+        radiance = self._in_own_colour(light, candidates)
+        self.dr.eval(radiance, bounces)
         object_id = setup.render_scene.object_of_shape[np.array(first.shape)]
-        return np.array(radiance), object_id, np.array(first.z_mm)
+        return np.array(radiance), np.array(bounces), object_id, np.array(first.z_mm)
 
     def _upload_bounds(self, majorant: Majorant | None) -> tuple[Any, Any]:
         """Both bounds of every entry; 0 without a majorant."""

@@ -152,13 +152,16 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
 
 def mirrored_radiance(
     render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int, above: Any
-) -> Any:
+) -> tuple[Any, Any]:
     """Radiance that one path from each first hit finds of what is brighter than `above`, in any colour, and
-    seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request."""
+    seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request.
+
+    And the number of mirrors and clear surfaces before the last that it has found.
+    """
     mi, dr, scene, context = render_scene.mi, load_drjit(), render_scene.scene, render_scene.mi.BSDFContext()
 
     def lengthen(
-        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, sampler: Any
+        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, found: Any, sampler: Any
     ) -> tuple[Any, ...]:
         choice, pair = sampler.next_1d(active), sampler.next_2d(active)
         sample, of_segment = hit.bsdf(ray).sample(context, hit, choice, pair, active)
@@ -166,13 +169,16 @@ def mirrored_radiance(
         ray = hit.spawn_ray(hit.to_world(sample.wo))
         hit, weight = scene.ray_intersect(ray, active), weight * of_segment
         shines = dr.select(active, hit.emitter(scene, active).eval(hit, active), 0)
-        radiance += dr.select(dr.max(shines) > above, weight * shines, 0)
-        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, sampler
+        is_bright = dr.max(shines) > above
+        radiance += dr.select(is_bright, weight * shines, 0)
+        found = dr.select(is_bright, longest - left, found)
+        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, found, sampler
 
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    left = dr.opaque(mi.UInt32, max_depth - 1)
-    path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), sampler
-    return dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)[4]
+    left, longest = dr.opaque(mi.UInt32, max_depth - 1), dr.opaque(mi.UInt32, max_depth)
+    path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), mi.UInt32(0), sampler
+    path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)
+    return path[4], path[6]
 
 
 def radiance_along(
