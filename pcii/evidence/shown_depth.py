@@ -44,23 +44,26 @@ class ShownDepth:
         self,
         data: PhotonCounts | Views,
         planes: FocalPlanes,
+        own: slice,
         nats: np.ndarray,
         block_px: int,
         model: TextureModel,
     ) -> np.ndarray:
-        """Where (h, w) bool a depth is shown by the evidence (Z, h, w) of `data` at these planes.
+        """Where (h, w) bool the evidence (Z, h, w) of `data` shows a depth at one of its `own` planes.
 
-        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`.
+        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`, of planes of the range and beyond.
         """
         from scipy.ndimage import maximum_filter
 
-        own_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        all_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        own_px = all_px[own]
         # Less than a step behind infinity a surface with little disparity would be sharp still.
         behind_px = -np.unique(np.maximum(own_px, step_px))
         behind, outside = (
             _evidence_at(total_px, data, block_px, model)
-            for total_px in (behind_px, _outside_px(own_px, step_px))
+            for total_px in (behind_px, _outside_px(all_px, step_px))
         )
+        outside, nats = np.concatenate([nats[: own.start], nats[own.stop :], outside]), nats[own]
         (h, w), side = nats.shape[1:], 1
         shown, squares = np.zeros((h, w), bool), np.mean(behind**2, axis=0)
         for _ in range(self.windows):
@@ -82,11 +85,11 @@ class ShownDepth:
         return shown
 
 
-def _outside_px(own_px: np.ndarray, step_px: float) -> np.ndarray:
-    """Total disparities outside the range, from infinity to as far in front of it as that is behind."""
-    nearest_px = own_px.max()
+def _outside_px(compared_px: np.ndarray, step_px: float) -> np.ndarray:
+    """Total disparities outside those, from infinity to as far in front of them as that is behind."""
+    nearest_px = compared_px.max()
     away_px = step_px * (np.arange(np.ceil(nearest_px / step_px)) + 0.5)
-    behind_px = own_px.min() - away_px
+    behind_px = compared_px.min() - away_px
     return np.concatenate([behind_px[behind_px > -step_px].clip(min=0), nearest_px + away_px])
 
 
