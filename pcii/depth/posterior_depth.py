@@ -33,16 +33,19 @@ PLANES_PER_BLOCK = 2
 AROUND_PX = 20.0
 """Depths are compared so far beyond requested planes in total disparity: what is defocused is to be found as
 well."""
-BEYOND_PX = 4.0
+BEYOND_PX = 7.0
 """Depths are compared so far beyond the ends of a range, so that a surface that is there is most probable
 there, and has no answer. If it is smaller, more of what is outside is answered at the ends; if it is larger,
 more planes are compared for nothing."""
 FOCUS_BLOCKS = 2.0
 """Without a range masks are of surfaces so far beyond the requested planes in total disparity at most, in
-coarse blocks: a blur half-extent of a block. If it is smaller, parts of bulky things are lost; if it is larger,
-things are claimed that are in focus at none of the planes."""
+coarse blocks: a blur half-extent of a block. If it is smaller, parts of bulky things are lost; if it is
+larger, things are claimed that are in focus at none of the planes."""
 END_TOLERANCE_PX = 0.5
 """Half the distance between planes: a surface at an end of a range may be found so far beyond it."""
+UNSUPPORTED_CONFIDENCE = 0.5
+"""Of the probability of a depth that the photons around do not support. If it is larger, plain light around a
+thing is too sure; if it is smaller, walls with little detail are less sure than they are right."""
 NO_DEPTHS = np.zeros(0)
 
 
@@ -118,14 +121,20 @@ class PosteriorDepth:
         probability, nothing, in_focus = network.maps
         maps = probability, nothing[0], block_px, in_focus[order]
         nowhere = np.zeros(nothing[0].shape, bool)
-        posterior = DepthPosterior(planes, *maps, is_detected=nowhere, hot_pixels=replaced)
-        side_px = max(coarse_px, self.block_px)
-        own = _within(coarse.planes, answered_px)
-        shown = self.shown(data, coarse.planes, own, coarse.nats, side_px, self.model)
-        shown = on_pixels(shown, side_px, data.grid.shape_HW)[::block_px, ::block_px]
-        is_radiance = isinstance(data, Views)
-        is_detected = self._detected(posterior, network.photons, shown, answered_px, is_radiance=is_radiance)
-        return replace(posterior, is_detected=is_detected)
+        posterior = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
+        plane, _, total_px = posterior.most_probable()
+        is_possible = _is_between(total_px, answered_px)
+        is_possible &= self._has_photons(network.photons, plane, block_px)
+        if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
+            is_possible &= posterior.no_surface <= self.max_empty
+        total_px = on_pixels(total_px, block_px, data.grid.shape_HW)
+        side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
+        depth = _nearest(coarse.planes, total_px[::side_px, ::side_px])
+        shown, supported = (
+            on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
+            for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
+        )
+        return replace(posterior, is_detected=self._detected(is_possible, shown), is_supported=supported)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.
@@ -171,25 +180,12 @@ class PosteriorDepth:
         nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
         return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest], own_planes, nats)
 
-    def _detected(
-        self,
-        posterior: DepthPosterior,
-        photons: np.ndarray,
-        shown: np.ndarray,
-        answered_px: np.ndarray,
-        *,
-        is_radiance: bool,
-    ) -> np.ndarray:
-        """Where a surface is detected between the ends (h, w) bool, from where a depth is shown (h, w)."""
+    def _detected(self, is_possible: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """Where a surface is detected (h, w) bool, from where one is possible and where a depth is shown."""
         from scipy.ndimage import label
 
-        plane, _, total_px = posterior.most_probable()
-        is_possible = _is_between(total_px, answered_px)
-        is_possible &= self._has_photons(photons, plane, posterior.block_px)
-        if not is_radiance:  # the network has not learned where radiance shows no surface
-            is_possible &= posterior.no_surface <= self.max_empty
-        shown = shown & is_possible
         labelled: Any = label(is_possible)
+        shown = shown & is_possible
         region = np.asarray(labelled[0]).ravel()
         cells = np.bincount(region).clip(min=1)
         shown_share = (np.bincount(region, shown.ravel()) / cells)[region].reshape(shown.shape)
@@ -257,9 +253,15 @@ def _ends_px(
     return np.array([max(ends_px), min(ends_px)])
 
 
+def _nearest(planes: FocalPlanes, total_px: np.ndarray) -> np.ndarray:
+    """The number of the plane nearest to total disparities, an array of their shape."""
+    numbers = np.arange(len(planes))
+    return np.interp(total_px, planes.total_disparity_px, numbers).round().astype(int)
+
+
 def _within(planes: FocalPlanes, ends_px: np.ndarray) -> slice:
-    """The planes from the closest to the farthest end to the closest to the nearest."""
-    nearest, farthest = (int(np.abs(planes.total_disparity_px - end).argmin()) for end in ends_px)
+    """The planes from that nearest to the farthest end to that nearest to the nearest."""
+    nearest, farthest = _nearest(planes, ends_px).tolist()
     return slice(farthest, nearest + 1)
 
 
@@ -275,6 +277,7 @@ def depth_map_of(posterior: DepthPosterior, z_range_mm: tuple[float, float]) -> 
     ends_px = total_disparity_px(grid, np.array(z_range_mm))
     is_answered = posterior.is_detected & _is_between(total_px, ends_px)
     depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, *ends_px[::-1]))
+    confidence = np.where(posterior.is_supported, confidence, UNSUPPORTED_CONFIDENCE * confidence)
     maps = np.where(is_answered, depth_mm, np.nan), np.where(is_answered, confidence, 0.0)
     on_film = (on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps)
     return DepthMap(*on_film, hot_pixels=posterior.hot_pixels)

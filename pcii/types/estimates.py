@@ -91,8 +91,8 @@ class DepthPosterior(ShortForm):
     there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
     total disparity. h x w are enough blocks for all pixels. `in_focus` (R, h, w) float32 is the probability
     that the surface belongs to an object in focus at each of R requested planes. `is_detected` (h, w) bool is
-    where depth maps and masks have an answer, `hot_pixels` as of a `DepthMap`. Raises `InputError` for other
-    shapes.
+    where depth maps and masks have an answer, and `is_supported` where the photons around tell the depth of
+    the block. `hot_pixels` is as of a `DepthMap`. Raises `InputError` for other shapes.
     """
 
     planes: FocalPlanes
@@ -101,6 +101,7 @@ class DepthPosterior(ShortForm):
     block_px: int
     in_focus: np.ndarray
     is_detected: np.ndarray
+    is_supported: np.ndarray
     hot_pixels: int = 0
 
     def __post_init__(self) -> None:
@@ -110,6 +111,7 @@ class DepthPosterior(ShortForm):
             "no_surface": (h, w),
             "in_focus": (len(self.in_focus), h, w),
             "is_detected": (h, w),
+            "is_supported": (h, w),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)
