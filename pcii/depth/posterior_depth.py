@@ -102,8 +102,8 @@ class PosteriorDepth:
         these."""
         z_mm, order = np.unique(z_mm, return_inverse=True)
         compared_px = _ends_px(data.grid, z_range_mm, z_mm, BEYOND_PX, AROUND_PX)
-        compared_mm = depth_of_total_disparity_mm(data.grid, compared_px)
-        planes = FocalPlanes.between(data.grid, *compared_mm.tolist(), self.step_px)
+        near_mm, far_mm = depth_of_total_disparity_mm(data.grid, compared_px).tolist()
+        planes = FocalPlanes.between(data.grid, near_mm, far_mm, self.step_px)
         coarse_px, block_px = self._blocks_px(planes)
         focus_px = 0.0 if z_range_mm else FOCUS_BLOCKS * coarse_px
         answered_px, replaced = _ends_px(data.grid, z_range_mm, z_mm, 0.0, focus_px), 0

@@ -111,7 +111,9 @@ def test_depths_that_look_alike_share_the_probability():
             surface = surface_posterior(evidence.nats, method.prior).transpose(2, 0, 1)
             nowhere = np.zeros(surface.shape[1:], np.float32)
             for posterior in (
-                DepthPosterior(planes, surface, nowhere, method.block_px, surface[:0], *2 * [nowhere > 0]),
+                DepthPosterior(
+                    planes, surface, nowhere, method.block_px, surface[:0], nowhere > 0, nowhere > 0
+                ),
                 method.posterior(counts, z_range_mm),
             ):
                 probabilities.append(np.median(posterior.most_probable()[1]))
