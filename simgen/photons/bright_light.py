@@ -152,7 +152,8 @@ def mirrored_light(
         own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
         name = _name(setup, tracer.objects[lamp])
         if own.bounces.any():
-            name += " through " + _name(setup, int(np.bincount(own.object_id).argmax()))
+            clear = setup.render_scene.names.get(int(np.bincount(own.object_id).argmax()))
+            name += " through what is no object" if clear is None else f" through '{clear}'"
         seen = BrightLight.of(name, own.light, own.radiance)
         result.append(seen if is_scattered else seen._replace(arrivals=own, bounces=bounces))
     return result
@@ -199,5 +200,8 @@ def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterato
 
 
 def _name(setup: Setup, number: int) -> str:
+    """What an object, or 0 for a lamp of the scene and -1 for what is all around, is called in messages."""
     name = setup.render_scene.names.get(number)
-    return "something that is no object" if name is None else f"'{name}'"
+    if name is None:
+        return "the surroundings" if number < 0 else "a lamp"
+    return f"'{name}'"

@@ -126,14 +126,11 @@ class KnownPlaces:
             accepted = part.try_candidates(group[here], view[here], cells, seed)
             tables.append(accepted.photons)
             candidates.append(here[accepted.candidate])
-        photons = joined(tables)
-        empty = nothing(1)
-        return empty._replace(photons=photons, candidate=np.concatenate(candidates))
+        return nothing(1)._replace(photons=joined(tables), candidate=np.concatenate(candidates))
 
 
 def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> MirrorImages | None:
-    """Images of these lights, of which all have arrivals; None if no path meets any of them, or too many
-    paths would have to be sent."""
+    """Images of these lights, of which all have arrivals; None if no path meets any of them."""
     peaks = [light.arrivals.peak.min() for light in lights if light.arrivals is not None]
     grid, above = sampler.setup.grid, LEAST_PEAK * float(min(peaks))
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
