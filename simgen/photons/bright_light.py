@@ -44,6 +44,8 @@ LIT_POINTS = 1 << 13
 """Rays of each lamp that stands at a point, by which the places are known that it lights."""
 SAME_DEPTH = 1e-3
 """Share by which depths of the same place may differ."""
+MIN_DISC_MM = 1.0
+"""The same where nothing is seen to have a depth."""
 STRAIGHT_POINTS = 1 << 13
 """Points of what shines in view, by which its light and its share of the film are known."""
 
@@ -117,11 +119,11 @@ def mirrored_light(
     grid = setup.grid
     depth_mm = float(np.median(z_mm[np.isfinite(z_mm)])) if np.isfinite(z_mm).any() else 0.0
     reach_mm = float(np.linalg.norm(setup.rig.position_mm[..., :2], axis=-1).max())
-    disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm)
+    disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm, MIN_DISC_MM)
     tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, disc_mm)
     known = set() if setup.render_scene.why_rendered else {one.number for one in setup.render_scene.shining}
     is_known = np.array([number in known for number in tracer.objects], dtype=bool)
-    if disc_mm <= 0 or not (tracer.has_mirrors or (with_straight and not is_known.all())):
+    if not (tracer.has_mirrors or (with_straight and not is_known.all())):
         return []
     least_radiance = brightest_that_matters(film_light, paths, grid.height * grid.width)
     survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % max(len(tracer.lamps), 1)
