@@ -26,8 +26,8 @@ def segment(
     or one that an installed package registers; or a function that returns a `Segmented`
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
     objects, their colours or their depths. "posterior" alone uses `z_range_mm` (near, far): what is
-    outside it is claimed at no plane, or else what is farther beyond the outermost planes than a block's
-    blur. Without photons nothing is in focus. Warns of frames whose saturation removed more than 2 % of the
+    outside it is claimed at no plane, or else what lies far beyond the outermost planes.
+    Without photons nothing is in focus. Warns of frames whose saturation removed more than 2 % of the
     photons. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a method of
     others that fails, writes into what it is given, or whose result is not a `Segmented` of these sections.
 
