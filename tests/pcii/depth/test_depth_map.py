@@ -276,10 +276,10 @@ def test_depths_that_are_too_many_or_seen_by_one_camera_are_refused():
     counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
     with pytest.raises(InputError, match=r"z_range_mm: .* choose a farther near end"):
         estimate_depth(counts, (1e-6, 1.0))
-    # The disparity at z is 1 / z px, and films of 8 px have nothing in common from 8 px on.
-    estimate_depth(counts, (1 / 9, 1 / 7.9))
-    with pytest.raises(InputError, match=r"z_range_mm: up to 0.125 mm no two cameras see the same"):
-        estimate_depth(counts, (0.125 - 1e-12, 0.125))
+    # The disparity at z is 1 / z px, and films of 256 px have nothing in common from 256 px on.
+    estimate_depth(counts, (1 / 257, 1 / 255.9))
+    with pytest.raises(InputError, match=r"z_range_mm: up to 0.00390625 mm no two cameras see the same"):
+        estimate_depth(counts, (1 / 256 - 1e-12, 1 / 256))
     for z_mm, sentence in (([1e-3], "no two cameras"), ([1e-6, 1.0], "choose a farther near end")):
         with pytest.raises(InputError, match=f"z_mm: .*{sentence}"):
             segment(counts, z_mm=z_mm)
