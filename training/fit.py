@@ -24,7 +24,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pcii.depth.surface_network import MIN_NEAR, WEIGHTS, near_requested
+from pcii.depth.surface_network import MIN_NEAR, WEIGHTS, requested_weights
 from training.examples import DEVICE, SIDES, Batch, Examples
 from training.layers import SurfaceNetwork
 from training.requests import NOT_COUNTED
@@ -176,7 +176,8 @@ def mask_log_probability(masks: Tensor, depth: Tensor, planes: Tensor) -> Tensor
     """Log-probabilities (B, R + 1, h, w) of belonging to the requested `planes` (B, R), last to none.
 
     `masks` (B, Z, h, w) are logits, between planes interpolated linearly, that are added to the logarithms of
-    the probabilities of depths near the planes, of the log-probabilities `depth` (B, Z + 1, h, w).
+    the probabilities of depths near the planes, of the log-probabilities `depth` (B, Z + 1, h, w) without a
+    request.
     """
     Z = masks.shape[1]
     is_missing = torch.isnan(planes)
@@ -185,8 +186,10 @@ def mask_log_probability(masks: Tensor, depth: Tensor, planes: Tensor) -> Tensor
     upper_share = (place - lower)[:, :, None, None]
     film = torch.arange(len(masks), device=masks.device)[:, None]
     logits = (1 - upper_share) * masks[film, lower] + upper_share * masks[film, lower + 1]
-    near = torch.stack([torch.from_numpy(near_requested(Z, each)) for each in planes.cpu().numpy()])
-    of_planes = torch.einsum("brz,bzhw->brhw", near.to(masks), depth[:, :-1].detach().exp())
+    weights = torch.stack([torch.from_numpy(requested_weights(Z, each)) for each in planes.cpu().numpy()])
+    probability = depth[:, :-1].detach().exp()
+    sums = torch.einsum("brz,bzhw->brhw", weights.to(masks), probability)
+    of_planes = sums[:, :-1] * (probability.sum(dim=1, keepdim=True) / sums[:, -1:].clamp(min=1e-30))
     of_none = (1 - of_planes.sum(dim=1, keepdim=True)).clamp(min=0)
     logits = (logits + (of_planes + MIN_NEAR).log()).masked_fill(is_missing[:, :, None, None], -1e4)
     return torch.log_softmax(torch.cat([logits, (of_none + MIN_NEAR).log()], dim=1), dim=1)

@@ -91,7 +91,7 @@ def example_of(counts: PhotonCounts, truth: Truth, z_mm: np.ndarray, rng: np.ran
     grid = counts.grid
     planes = FocalPlanes.between(grid, rng.uniform(*NEAR) * z_mm.min(), rng.uniform(*FAR) * z_mm.max(), 1.0)
     method = PosteriorDepth()
-    counts = without_hot_pixels(counts)
+    counts, _ = without_hot_pixels(counts, planes)
     evidence = evidence_of_texture(counts, planes, method.block_px, method.model)
     inputs = method.network_inputs(evidence, planes, method.block_px, np.zeros(0))._asdict()
     del inputs["hint"]

@@ -4,7 +4,7 @@ results.json             dataset, its identity and the light; versions of the so
                          every file with size and SHA-256
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
-depth.zarr/              z_mm, confidence
+depth.zarr/              z_mm, confidence; an attribute hot_pixels, as segmented_<method>.zarr
 score.json               as in `Score.to_dict`
 *.png, report.html       pictures and the report
 
@@ -162,13 +162,14 @@ def save_segmented(folder: Path, focus: Segmented) -> None:
     path = folder / f"segmented_{focus.method}.zarr"
     if path.parent != folder or path.exists():
         raise InputError(f"method: {focus.method!r} is no file name, or the name of two methods")
-    write_arrays_safely(path, arrays, SEGMENTED_LABELS, {"method": focus.method})
+    attributes = {"method": focus.method, "hot_pixels": focus.hot_pixels}
+    write_arrays_safely(path, arrays, SEGMENTED_LABELS, attributes)
 
 
 def save_depth(folder: Path, depth: DepthMap) -> None:
     """Write the depth map and its confidence."""
     arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
-    write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS)
+    write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS, {"hot_pixels": depth.hot_pixels})
 
 
 def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthMap | None]:
@@ -193,7 +194,10 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
             sections[planes] = reconstruct(dataset.counts, arrays["z_mm"])
         method, photons = part.removeprefix("segmented_").removesuffix(".zarr"), arrays.get("photon_in_focus")
         segmented.append(Segmented(arrays["in_focus"], method, sections[planes], photon_in_focus=photons))
-    depth = DepthMap(**read(DEPTH, DEPTH_LABELS)) if lists_part(files, DEPTH) else None
+    depth = None
+    if lists_part(files, DEPTH):
+        maps = read(DEPTH, DEPTH_LABELS)
+        depth = DepthMap(maps["z_mm"], maps["confidence"])
     if not segmented and depth is None:
         raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with `pcii run`")
     return segmented, depth

@@ -29,7 +29,7 @@ from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import read_results
 from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
-from pcii.types.estimates import DepthMap
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_limit import Light
 
 MIN_ANSWERED_SHARE = 0.1
@@ -72,6 +72,7 @@ def run(
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
+    _say_hot_pixels(outcome.depth)
     _warn_of_few_depths(outcome.depth, data, z_range_mm)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
@@ -142,6 +143,7 @@ def depth(
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
     say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, paler where less sure")
+    _say_hot_pixels(depth_map)
     _warn_of_few_depths(depth_map, data, (near, far))
     _say_next_score(data, out)
 
@@ -177,6 +179,7 @@ def segment(
             write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
     shares = zip(focus.z_mm, focus.in_focus.mean(axis=(1, 2)), strict=True)
     say(f"{out}: in focus are " + ", ".join(f"{share:.2%} at {z:g} mm" for z, share in shares))
+    _say_hot_pixels(focus)
     _say_next_score(data, out)
 
 
@@ -210,6 +213,11 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         say("the dataset has no truth: what is compared with it is null")
     else:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
+
+
+def _say_hot_pixels(estimate: Segmented | DepthMap) -> None:
+    if estimate.hot_pixels:
+        say(f"hot pixels of the sensor, taken from a neighbour in all views: {estimate.hot_pixels}")
 
 
 def _warn_of_few_depths(depth_map: DepthMap, data: Dataset, z_range_mm: tuple[float, float]) -> None:

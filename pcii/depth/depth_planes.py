@@ -12,6 +12,8 @@ from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total
 
 MOST_SPAN_PX = 2000.0
 """Largest change of total disparity between the ends of a range that is searched."""
+SMALL_FILM_PX = 256
+"""Parallax in px from camera to camera up to which depths are searched on films of any size."""
 
 
 def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
@@ -35,9 +37,11 @@ def check_search(grid: CameraGrid, name: str, z_mm: np.ndarray) -> None:
             f"{name}: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
             f"most {MOST_SPAN_PX:g} px can be searched; choose a farther near end"
         )
-    # From camera to camera a point moves by its disparity: by a film or more, it is on one film alone.
-    axes = zip(disparity_px(grid, far), (grid.width, grid.height), (grid.cols, grid.rows), strict=True)
-    if not any(cameras > 1 and disparity < size for disparity, size, cameras in axes):
+    # From camera to camera a point moves by its disparity: by a film or more, it is on one film alone. Small
+    # films are searched all the same, which takes no time.
+    sizes = np.maximum([grid.width, grid.height], SMALL_FILM_PX).tolist()
+    axes = zip(disparity_px(grid, far), sizes, (grid.cols, grid.rows), strict=True)
+    if grid.view_count > 1 and not any(n > 1 and disparity < size for disparity, size, n in axes):
         raise InputError(f"{name}: up to {far:g} mm no two cameras see the same; choose a farther end")
 
 

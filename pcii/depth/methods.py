@@ -84,12 +84,13 @@ def estimate_depth(
 def depth_posterior(
     data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, z_mm: object = None
 ) -> DepthPosterior:
-    """Probability of each depth in `z_range_mm`, and of no surface there, for square blocks of pixels.
+    """Probability of each depth in `z_range_mm` and around, and of no surface, for square blocks of pixels.
 
     It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
     value everywhere: where no photon is, that of scenes on average. Of the depths `z_mm` (Z,), if any are
-    given, it says what is in focus there, as the method "posterior" of `segment` does; depths within 20 px of
-    total disparity around them are part of it. Raises `InputError` as
+    given, it says what is in focus there, as the method "posterior" of `segment` does. Depths within 20 px of
+    total disparity around these and 7 px beyond the range are part of it, so that what is outside is not
+    taken for something at the ends; depth maps and masks have no answer there. Raises `InputError` as
     `estimate_depth`.
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)

@@ -33,6 +33,19 @@ PLANES_PER_BLOCK = 2
 AROUND_PX = 20.0
 """Depths are compared so far beyond requested planes in total disparity: what is defocused is to be found as
 well."""
+BEYOND_PX = 7.0
+"""Depths are compared so far beyond the ends of a range, so that a surface that is there is most probable
+there, and has no answer. If it is smaller, more of what is outside is answered at the ends; if it is larger,
+more planes are compared for nothing."""
+FOCUS_BLOCKS = 2.0
+"""Without a range masks are of surfaces so far beyond the requested planes in total disparity at most, in
+coarse blocks: a blur half-extent of a block. If it is smaller, parts of bulky things are lost; if it is
+larger, things are claimed that are in focus at none of the planes."""
+END_TOLERANCE_PX = 0.5
+"""Half the distance between planes: a surface at an end of a range may be found so far beyond it."""
+UNSUPPORTED_CONFIDENCE = 0.5
+"""Of the probability of a depth that the photons around do not support. If it is larger, plain light around a
+thing is too sure; if it is smaller, walls with little detail are less sure than they are right."""
 NO_DEPTHS = np.zeros(0)
 
 
@@ -87,10 +100,17 @@ class PosteriorDepth:
     ) -> DepthPosterior:
         """The posterior of planes through the range, if any, and around the planes at `z_mm` (R,); masks of
         these."""
-        data = without_hot_pixels(data) if isinstance(data, PhotonCounts) else in_memory(data)
         z_mm, order = np.unique(z_mm, return_inverse=True)
-        planes = FocalPlanes.between(data.grid, *_whole_range_mm(data.grid, z_range_mm, z_mm), self.step_px)
+        compared_px = _ends_px(data.grid, z_range_mm, z_mm, BEYOND_PX, AROUND_PX)
+        near_mm, far_mm = depth_of_total_disparity_mm(data.grid, compared_px).tolist()
+        planes = FocalPlanes.between(data.grid, near_mm, far_mm, self.step_px)
         coarse_px, block_px = self._blocks_px(planes)
+        focus_px = 0.0 if z_range_mm else FOCUS_BLOCKS * coarse_px
+        answered_px, replaced = _ends_px(data.grid, z_range_mm, z_mm, 0.0, focus_px), 0
+        if isinstance(data, PhotonCounts):
+            data, replaced = without_hot_pixels(data, planes.take(_within(planes, answered_px)))
+        else:
+            data = in_memory(data)
         network = coarse = self._film_outputs(data, planes, block_px, z_mm)
         if coarse_px > block_px:
             coarse = self._film_outputs(data, planes, coarse_px, z_mm)
@@ -100,13 +120,21 @@ class PosteriorDepth:
                 mean /= 2
         probability, nothing, in_focus = network.maps
         maps = probability, nothing[0], block_px, in_focus[order]
-        posterior = DepthPosterior(planes, *maps, is_detected=np.zeros(nothing[0].shape, bool))
-        side_px = max(coarse_px, self.block_px)
-        shown = self.shown(data, coarse.planes, coarse.nats, side_px, self.model)
-        shown = on_pixels(shown, side_px, data.grid.shape_HW)[::block_px, ::block_px]
-        is_radiance = isinstance(data, Views)
-        is_detected = self._detected(posterior, network.photons, shown, is_radiance=is_radiance)
-        return replace(posterior, is_detected=is_detected)
+        nowhere = np.zeros(nothing[0].shape, bool)
+        posterior = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
+        plane, _, total_px = posterior.most_probable()
+        is_possible = _is_between(total_px, answered_px)
+        is_possible &= self._has_photons(network.photons, plane, block_px)
+        if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
+            is_possible &= posterior.no_surface <= self.max_empty
+        total_px = on_pixels(total_px, block_px, data.grid.shape_HW)
+        side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
+        depth = _nearest(coarse.planes, total_px[::side_px, ::side_px])
+        shown, supported = (
+            on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
+            for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
+        )
+        return replace(posterior, is_detected=self._detected(is_possible, shown), is_supported=supported)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.
@@ -152,18 +180,12 @@ class PosteriorDepth:
         nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
         return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest], own_planes, nats)
 
-    def _detected(
-        self, posterior: DepthPosterior, photons: np.ndarray, shown: np.ndarray, *, is_radiance: bool
-    ) -> np.ndarray:
-        """Where a surface is detected (h, w) bool, from where a depth is shown (h, w)."""
+    def _detected(self, is_possible: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """Where a surface is detected (h, w) bool, from where one is possible and where a depth is shown."""
         from scipy.ndimage import label
 
-        plane, _, _ = posterior.most_probable()
-        is_possible = self._has_photons(photons, plane, posterior.block_px)
-        if not is_radiance:  # the network has not learned where radiance shows no surface
-            is_possible &= posterior.no_surface <= self.max_empty
-        shown = shown & is_possible
         labelled: Any = label(is_possible)
+        shown = shown & is_possible
         region = np.asarray(labelled[0]).ravel()
         cells = np.bincount(region).clip(min=1)
         shown_share = (np.bincount(region, shown.ravel()) / cells)[region].reshape(shown.shape)
@@ -214,31 +236,51 @@ class PosteriorDepth:
         return window_sums(photons, self.window_px / (block_px * CELL_BLOCKS))
 
 
-def _whole_range_mm(
-    grid: CameraGrid, z_range_mm: tuple[float, float] | None, z_mm: np.ndarray
-) -> tuple[float, float]:
-    """Near and far end of the range and of the depths around `z_mm`, which reach to half of the least total
-    disparity at most."""
-    ends_mm = [] if z_range_mm is None else list(z_range_mm)
-    if z_mm.size:
-        total_px = total_disparity_px(grid, z_mm)
-        farthest_px = max(total_px.min() - AROUND_PX, total_px.min() / 2)
-        around_px = np.array([total_px.max() + AROUND_PX, farthest_px])
-        ends_mm += depth_of_total_disparity_mm(grid, around_px).tolist()
-    return min(ends_mm), max(ends_mm)
+def _ends_px(
+    grid: CameraGrid,
+    z_range_mm: tuple[float, float] | None,
+    z_mm: np.ndarray,
+    beyond_px: float,
+    around_px: float,
+) -> np.ndarray:
+    """Nearest and farthest total disparity (2,), `beyond_px` beyond the range, if any, and `around_px` around
+    the depths `z_mm`, if any, but at the far end no less than half of their own."""
+    ends_px = list[float]()
+    for depths_mm, margin_px in ((z_range_mm, beyond_px), (z_mm, around_px)):
+        if depths_mm is not None and len(depths_mm):
+            total_px = total_disparity_px(grid, np.array(depths_mm))
+            ends_px += [total_px.max() + margin_px, max(total_px.min() - margin_px, total_px.min() / 2)]
+    return np.array([max(ends_px), min(ends_px)])
+
+
+def _nearest(planes: FocalPlanes, total_px: np.ndarray) -> np.ndarray:
+    """The number of the plane nearest to total disparities, an array of their shape."""
+    numbers = np.arange(len(planes))
+    return np.interp(total_px, planes.total_disparity_px, numbers).round().astype(int)
+
+
+def _within(planes: FocalPlanes, ends_px: np.ndarray) -> slice:
+    """The planes from that nearest to the farthest end to that nearest to the nearest."""
+    nearest, farthest = _nearest(planes, ends_px).tolist()
+    return slice(farthest, nearest + 1)
+
+
+def _is_between(total_px: np.ndarray, ends_px: np.ndarray) -> np.ndarray:
+    nearest_px, farthest_px = ends_px
+    return (total_px > farthest_px - END_TOLERANCE_PX) & (total_px < nearest_px + END_TOLERANCE_PX)
 
 
 def depth_map_of(posterior: DepthPosterior, z_range_mm: tuple[float, float]) -> DepthMap:
     """Depth and confidence of pixels, where the posterior has an answer within the range."""
     grid = posterior.planes.grid
-    tolerance_px = 0.5  # half the distance between planes: a surface at an end may lie so far beyond it
     _, confidence, total_px = posterior.most_probable()
-    nearest_px, farthest_px = total_disparity_px(grid, np.array(z_range_mm))
-    is_inside = (total_px > farthest_px - tolerance_px) & (total_px < nearest_px + tolerance_px)
-    is_answered = posterior.is_detected & is_inside
-    depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, farthest_px, nearest_px))
+    ends_px = total_disparity_px(grid, np.array(z_range_mm))
+    is_answered = posterior.is_detected & _is_between(total_px, ends_px)
+    depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, *ends_px[::-1]))
+    confidence = np.where(posterior.is_supported, confidence, UNSUPPORTED_CONFIDENCE * confidence)
     maps = np.where(is_answered, depth_mm, np.nan), np.where(is_answered, confidence, 0.0)
-    return DepthMap(*(on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps))
+    on_film = (on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps)
+    return DepthMap(*on_film, hot_pixels=posterior.hot_pixels)
 
 
 def _in_four(evidence: TextureEvidence, shape_HW: tuple[int, int]) -> TextureEvidence:

@@ -69,7 +69,8 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     in_focus = np.empty((requested_planes.size, h, w), np.float32)
     lower = np.clip(requested_planes.astype(int), 0, max(Z - 2, 0))
     upper = np.minimum(lower + 1, Z - 1)
-    near, prior = near_requested(Z, requested_planes), depth_prior(Z, requested_planes)[:, None, None]
+    weights = requested_weights(Z, requested_planes)
+    prior = weights[-1, :, None, None]
     upper_share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
     names = [argument.name for argument in head.get_inputs()]
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
@@ -93,8 +94,8 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
         tempered = np.exp(logit, out=logit)
         tempered *= prior
         np.multiply(tempered, some / tempered.sum(axis=0), out=probability[:, top:end])
-        weight *= prior
-        of_planes = np.tensordot(near, weight, axes=1) * (some / weight.sum(axis=0))
+        *of_planes, of_all = np.tensordot(weights, weight, axes=1)
+        of_planes = np.reshape(of_planes, (-1, *some.shape)) * (some / of_all)
         of_none = np.maximum(1 - of_planes.sum(axis=0, keepdims=True), 0)
         at_planes = (1 - upper_share) * mask[lower] + upper_share * mask[upper]
         logits = np.concatenate([at_planes + np.log(of_planes + MIN_NEAR), np.log(of_none + MIN_NEAR)])
@@ -108,11 +109,21 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
 
 def depth_prior(Z: int, requested_planes: np.ndarray) -> np.ndarray:
     """How probable a surface at each of Z planes is without any photon, relative to planes that nobody
-    requests: (Z,) float32. The request says that objects are near these planes.
+    requests: (Z,) float32. The request says that objects are near these planes; NaN requests nothing.
     """
     offset = np.arange(Z) - requested_planes[:, None]
     bumps = np.exp(-((offset / REQUESTED_SIGMA) ** 2) / 2)
-    return (1 + REQUESTED_GAIN * bumps.sum(axis=0)).astype(np.float32)
+    return (1 + REQUESTED_GAIN * np.nansum(bumps, axis=0)).astype(np.float32)
+
+
+def requested_weights(Z: int, requested_planes: np.ndarray) -> np.ndarray:
+    """Weights (R + 1, Z) float32 of the probabilities of planes without a request.
+
+    The weighted sum of the last row is that of all planes with the request, and each other row's, divided by
+    it, is how probable a surface near a requested plane is. NaN requests nothing.
+    """
+    prior = depth_prior(Z, requested_planes)
+    return np.concatenate([near_requested(Z, requested_planes) * prior, prior[None]])
 
 
 def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:

@@ -9,6 +9,9 @@ Of noise a coefficient of an octave has evidence with a variance of 1/2 square n
 4^-octave and stands for 4^octave blocks, so that the sum over many blocks has a variance of some 2/3 for each
 of them: in a Gaussian window of standard deviation s blocks, of weight 1 at its centre, a standard deviation
 of 1.4 s nats.
+
+Near a depth that is shown a plain block is given one that need not be its own. It is supported if the
+evidence in a window at its depth exceeds that behind infinity, and is a large part of that at the best plane.
 """
 
 from dataclasses import dataclass, replace
@@ -36,6 +39,12 @@ class ShownDepth:
     least_gain: float = 1.0
     most_gain: float = 4.0
     """Ends of what it is to exceed, in nats per block of the window's standard deviation."""
+    support_sigmas: float = 6.0
+    """As `noise_sigmas`, of the evidence for the depth of a block, where a depth is shown around."""
+    support_share: float = 0.5
+    """Least share that it has of the evidence at the best plane: things out of focus have some as well."""
+    support_planes: int = 2
+    """Planes between the depth of a block and that evidence, since depths may be a little off."""
     step_blocks: float = 4.0
     """Total disparity, in blocks, between planes outside the range, the first of which is half as far from
     its end, and the least of planes behind infinity."""
@@ -44,25 +53,33 @@ class ShownDepth:
         self,
         data: PhotonCounts | Views,
         planes: FocalPlanes,
+        own: slice,
         nats: np.ndarray,
+        depth: np.ndarray,
         block_px: int,
         model: TextureModel,
-    ) -> np.ndarray:
-        """Where (h, w) bool a depth is shown by the evidence (Z, h, w) of `data` at these planes.
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where (h, w) bool the evidence (Z, h, w) shows a depth, and where it supports that of a block.
 
-        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`.
+        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`, of planes of the range, `own`,
+        and beyond. `depth` (h, w) are numbers of planes; those beyond the range are taken for its ends.
         """
         from scipy.ndimage import maximum_filter
 
-        own_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        all_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
+        own_px = all_px[own]
         # Less than a step behind infinity a surface with little disparity would be sharp still.
         behind_px = -np.unique(np.maximum(own_px, step_px))
         behind, outside = (
             _evidence_at(total_px, data, block_px, model)
-            for total_px in (behind_px, _outside_px(own_px, step_px))
+            for total_px in (behind_px, _outside_px(all_px, step_px))
         )
+        outside, nats = np.concatenate([nats[: own.start], nats[own.stop :], outside]), nats[own]
         (h, w), side = nats.shape[1:], 1
-        shown, squares = np.zeros((h, w), bool), np.mean(behind**2, axis=0)
+        shown, supported = np.zeros((h, w), bool), np.zeros((h, w), bool)
+        squares = np.mean(behind**2, axis=0)
+        depth = np.clip(depth - own.start, 0, len(nats) - 1)
+        i, j = np.indices((h, w), sparse=True)
         for _ in range(self.windows):
             # Each window has the same standard deviation in cells, which grow with it.
             side *= 2
@@ -73,20 +90,29 @@ class ShownDepth:
             reach = 2 * int(np.ceil(np.abs(behind_px).max() / block_px / side)) + 1
             sigma_cells = self.smallest_blocks / 2
             # The square of a Gaussian is one of 1 / sqrt(2) the width.
-            noise = np.sqrt(maximum_filter(window_sums(squares, sigma_cells / 2**0.5), reach))
+            local_noise = np.sqrt(window_sums(squares, sigma_cells / 2**0.5))
+            noise = maximum_filter(local_noise, reach)
             blocks = sigma_cells * side
             least = np.clip(self.noise_sigmas * noise, self.least_gain * blocks, self.most_gain * blocks)
-            own, other, beside = (_best_in_window(part, sigma_cells) for part in (nats, behind, outside))
-            is_shown = (own - maximum_filter(other, reach) > least) & (own >= beside)
+            sums = _in_windows(nats, sigma_cells)
+            best, other, beside = (
+                part.max(axis=0)
+                for part in (sums, _in_windows(behind, sigma_cells), _in_windows(outside, sigma_cells))
+            )
+            is_shown = (best - maximum_filter(other, reach) > least) & (best >= beside)
             shown |= on_pixels(is_shown, side, (h, w))
-        return shown
+            near = maximum_filter(sums, (2 * self.support_planes + 1, 1, 1))
+            enough = other + np.minimum(self.support_sigmas * local_noise, least)
+            is_supported = (near > enough) & (near >= beside) & (near >= self.support_share * best)
+            supported |= is_supported[depth, i // side, j // side]
+        return shown, supported
 
 
-def _outside_px(own_px: np.ndarray, step_px: float) -> np.ndarray:
-    """Total disparities outside the range, from infinity to as far in front of it as that is behind."""
-    nearest_px = own_px.max()
+def _outside_px(compared_px: np.ndarray, step_px: float) -> np.ndarray:
+    """Total disparities outside those, from infinity to as far in front of them as that is behind."""
+    nearest_px = compared_px.max()
     away_px = step_px * (np.arange(np.ceil(nearest_px / step_px)) + 0.5)
-    behind_px = own_px.min() - away_px
+    behind_px = compared_px.min() - away_px
     return np.concatenate([behind_px[behind_px > -step_px].clip(min=0), nearest_px + away_px])
 
 
@@ -102,8 +128,8 @@ def _evidence_at(
     return evidence_of_texture(replace(data, grid=grid), planes, block_px, model).nats
 
 
-def _best_in_window(nats: np.ndarray, sigma: float) -> np.ndarray:
-    """The largest sum (h, w) of any plane in the window around each cell."""
+def _in_windows(nats: np.ndarray, sigma: float) -> np.ndarray:
+    """Sums (Z, h, w) in the window around each cell."""
     from pcii.base.compiled_loops import each_in_threads
 
-    return np.max(each_in_threads(lambda z: window_sums(nats[z], sigma), range(len(nats))), axis=0)
+    return np.stack(each_in_threads(lambda z: window_sums(nats[z], sigma), range(len(nats))))

@@ -25,8 +25,8 @@ def segment(
     et al. 2017, Eqs. 7-9); a simple one to compare them with ("brightness", "variance", "shape-from-focus");
     or one that an installed package registers; or a function that returns a `Segmented`
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
-    objects, their colours or their depths. "posterior" alone uses `z_range_mm` (near, far): surfaces may be
-    there, or else within 20 px of total disparity around the planes.
+    objects, their colours or their depths. "posterior" alone uses `z_range_mm` (near, far): what is
+    outside it is claimed at no plane, or else what lies far beyond the outermost planes.
     Without photons nothing is in focus. Warns of frames whose saturation removed more than 2 % of the
     photons. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a method of
     others that fails, writes into what it is given, or whose result is not a `Segmented` of these sections.

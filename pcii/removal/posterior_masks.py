@@ -37,4 +37,5 @@ def masks_of(posterior: DepthPosterior, sections: Sections) -> Segmented:
         on_pixels(blocks, posterior.block_px, posterior.planes.grid.shape_HW)
         for blocks in (is_own & posterior.is_detected, posterior.in_focus)
     )
-    return Segmented(masks, "posterior", sections, {"probability": probability})
+    steps, hot_pixels = {"probability": probability}, posterior.hot_pixels
+    return Segmented(masks, "posterior", sections, steps, hot_pixels=hot_pixels)

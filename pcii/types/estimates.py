@@ -20,7 +20,7 @@ class Segmented(Drawn):
     `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
     single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
     (`PhotonCounts.events`, in their order) come from points in focus in each plane; else that is None.
-    Raises `InputError` for an array of another shape or dtype.
+    `hot_pixels` is as of a `DepthMap`. Raises `InputError` for an array of another shape or dtype.
     """
 
     in_focus: np.ndarray
@@ -28,6 +28,7 @@ class Segmented(Drawn):
     sections: Sections
     steps: Mapping[str, np.ndarray] = field(default_factory=dict)
     photon_in_focus: np.ndarray | None = None
+    hot_pixels: int = 0
 
     def __post_init__(self) -> None:
         if not isinstance(self.sections, Sections):
@@ -58,12 +59,14 @@ class DepthMap(Drawn):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
     `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
-    true one, as the method states it: 0 where no depth is given. Raises `InputError` if the shapes differ, or
-    for what is no array of real numbers.
+    true one, as the method states it: 0 where no depth is given. `hot_pixels` is the number of pixels of a
+    film that the method took for faults of the sensor and replaced. Raises `InputError` if the shapes differ,
+    or for what is no array of real numbers.
     """
 
     z_mm: np.ndarray
     confidence: np.ndarray
+    hot_pixels: int = 0
 
     def __post_init__(self) -> None:
         for name, values in (("z_mm", self.z_mm), ("confidence", self.confidence)):
@@ -88,7 +91,8 @@ class DepthPosterior(ShortForm):
     there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
     total disparity. h x w are enough blocks for all pixels. `in_focus` (R, h, w) float32 is the probability
     that the surface belongs to an object in focus at each of R requested planes. `is_detected` (h, w) bool is
-    where depth maps and masks have an answer. Raises `InputError` for other shapes.
+    where depth maps and masks have an answer, and `is_supported` where the photons around tell the depth of
+    the block. `hot_pixels` is as of a `DepthMap`. Raises `InputError` for other shapes.
     """
 
     planes: FocalPlanes
@@ -97,6 +101,8 @@ class DepthPosterior(ShortForm):
     block_px: int
     in_focus: np.ndarray
     is_detected: np.ndarray
+    is_supported: np.ndarray
+    hot_pixels: int = 0
 
     def __post_init__(self) -> None:
         h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
@@ -105,6 +111,7 @@ class DepthPosterior(ShortForm):
             "no_surface": (h, w),
             "in_focus": (len(self.in_focus), h, w),
             "is_detected": (h, w),
+            "is_supported": (h, w),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)

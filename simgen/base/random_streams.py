@@ -33,6 +33,7 @@ Stage = Literal[
     "emission candidates",
     "candidate numbers",
     "candidate times",
+    "lamp rays",
 ]
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")
 """Stages that describe the cameras themselves. They depend on the recipe's seed alone, so that the same
@@ -62,7 +63,8 @@ def generator(
 def integer(
     seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
 ) -> int:
-    """A 32-bit seed for the renderer, of a stage as for `generator`."""
+    """A seed of 128 bits for light paths, of a stage as for `generator`."""
     key = {"view": view, "part": part, "attempt": attempt, "round_number": round_number}
     sequence = generator(seed, stage=stage, **key).bit_generator.seed_seq
-    return int(sequence.generate_state(1)[0])
+    low, high = sequence.generate_state(2, np.uint64)
+    return int(high) << 64 | int(low)

@@ -125,7 +125,7 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
         for name in names:
             (new / name).parent.mkdir(parents=True, exist_ok=True)
             (new / name).write_bytes((path.parent / name).read_bytes())
-    unused = f"{shorten(', '.join(xml.unused))}: recipes have them, and of a sensor its place alone is used"
+    unused = f"{shorten(', '.join(xml.unused))}: recipes have them; of a sensor place and medium are used"
     return ImportedScene(out, (unused,) if xml.unused else (), names)
 
 

@@ -1,5 +1,6 @@
 """Photon counts: by thinning a majorant, or from rendered views, and which of the two.
 
+bright_light          Bright light that few paths meet: what holds it, how much it is, and where it is seen.
 candidates            Candidates of photons: rays drawn from a majorant, and followed if they may be
                       bright enough to be kept.
 counting_plan         How photon counts will be made: thinned one by one, or drawn from rendered views, and
@@ -10,6 +11,8 @@ emission_sampler      Candidates of photons that come straight from something th
 exploration           What is found out about a scene's light before photons are drawn: the majorant, and
                       what it keeps.
 majorant              How bright it can get where: the majorant from which photon candidates are drawn.
+mirror_images         Photons of lamps that are seen by mirrors and through glass, drawn where their images
+                      fall on the films.
 photon_counting       The photon counts of a dataset: thinned or drawn from views, counted by the sensor,
                       written.
 scalar_sampler        Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call

@@ -22,14 +22,31 @@ from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.sensor.photon_table import PhotonTable, no_photons
 
 
+class ImageCells(NamedTuple):
+    """Cells of the films in which images of lamps in mirrors and glass are drawn apart (`mirror_images`).
+
+    A px has `per_px` cells to a side; `number` (M,) uint64, sorted, are those of the cells, counted along
+    rows, columns of all films. What is seen there by mirrors alone is drawn apart if it is brighter than
+    `above`.
+    """
+
+    per_px: int
+    number: np.ndarray
+    above: float
+
+
 @dataclass(frozen=True)
 class Setup:
-    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments."""
+    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments.
+
+    Paths through the film leave out what is drawn apart in `image_cells`.
+    """
 
     render_scene: RenderScene
     cameras: Cameras
     cfa: str | None
     max_depth: int
+    image_cells: ImageCells | None = None
 
     @cached_property
     def rig(self) -> Rig:
@@ -174,8 +191,10 @@ class CandidateSampler(ABC):
         """Light paths of `candidates`, of which `followed` go on beyond their first hit."""
         return candidates + (self.paths_each - 1) * followed
 
-    def require_finite(self, radiance: np.ndarray, object_id: np.ndarray) -> None:
-        """`InputError` for radiance (N,) that is no finite number, with the object (N,) that was seen."""
+    def require_finite(self, radiance: np.ndarray, candidates: Candidates, object_id: np.ndarray) -> None:
+        """`InputError` for radiance (N,) of candidates, which see objects (N,), that is no finite number."""
         wrong = np.flatnonzero(~np.isfinite(radiance))
         if wrong.size:
-            raise InputError(not_finite(self.setup.render_scene, int(object_id[wrong[0]])))
+            k, l, row, col = (int(np.array(part)[wrong[0]]) for part in candidates[:4])
+            scene, number = self.setup.render_scene, int(object_id[wrong[0]])
+            raise InputError(not_finite(scene, number, (k, l), (row, col), self.setup.grid))

@@ -10,7 +10,7 @@ is (see `photon_counting.draw_from_views`).
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -22,9 +22,9 @@ from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig, corners, with_larger_pixels
+from simgen.photons.bright_light import LEAST_SHARE, BrightLight, lit_light, mirrored_light, straight_light
 from simgen.photons.candidates import Setup
-from simgen.photons.emission_sampler import EmissionSampler
-from simgen.photons.exploration import EXPLORATION_SEED, Exploration, explore
+from simgen.photons.exploration import Exploration, explore, sampler_of_films
 from simgen.photons.scopes import Scopes
 from simgen.photons.thinning import MAX_SINGLE_PHOTONS
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -46,8 +46,6 @@ nothing else are made alike: all with the origins of photons or all without."""
 PROBE_PX = 64
 """Longer side of the film that the probe renders, twice."""
 PROBE_SAMPLES = 64
-AIMED_POINTS = 1 << 13
-"""Points of what shines in view, by which its light and its share of the film are known."""
 DEPTH_STEPS = 64
 """Depths are rounded to equal steps of disparity, this many up to the nearest."""
 MAX_THINNED_PHOTONS = 1e10
@@ -99,15 +97,21 @@ class Plan:
     """Standard error of the light that a dense view's budget is divided by, as a share of it."""
     depths_mm: tuple[float, ...] = ()
     """Some of the depths that the corner cameras see, if photons are thinned."""
+    bright_light: tuple[BrightLight, ...] = ()
+    """Bright light that few paths meet, and that the forecast of rendered views counts in."""
     explored: Exploration | None = field(default=None, compare=False)
     """What is known of the light, if photons are thinned."""
 
 
 class Probe(NamedTuple):
-    """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view."""
+    """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view.
+
+    `bright_light` is what of both the probe's own paths have likely not met.
+    """
 
     mean: float
     variance: float
+    bright_light: tuple[BrightLight, ...] = ()
 
     def photon_noise(self, photons_per_radiance: float, samples: int) -> float:
         """Variance that rendering adds to counts, as a share of their Poisson variance."""
@@ -151,29 +155,61 @@ def plan(
         return cheaper
     explored = explore(setup, scopes.photons, scopes.photons_per_radiance)
     if not explored.is_bounded:
-        return _choose_cheaper(scopes, setup, kind, min_samples, UNBOUNDED)
+        return _choose_cheaper(scopes, setup, kind, min_samples, UNBOUNDED, explored.unmet)
     return replace(cheaper, explored=explored)
 
 
-def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
-    """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
-    small = replace(_coarse(grid), rows=1, cols=1)
+def probe(setup: Setup, seed: int, found: Sequence[BrightLight] = ()) -> Probe:
+    """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise.
+
+    What is known of bright light and its paths have likely not met is added, or what an exploration `found`
+    of it, whichever has more noise: light that fills n pixels with the radiance L adds n L to the sum over
+    the pixels, and n L^2 to the variance.
+    """
+    grid = setup.grid
+    small, pixels = replace(_coarse(grid), rows=1, cols=1), grid.height * grid.width
 
     def mosaic(part: int) -> np.ndarray:
         view_seed = seeds.integer(seed, stage="plan probe", part=part)
         samples = {"samples_per_pixel": PROBE_SAMPLES, "independent": True}
-        view = render_view(render_scene, small, 0, 0, seed=view_seed, **samples)
-        return sense(view, cfa).astype(np.float64)
+        view = render_view(setup.render_scene, small, 0, 0, seed=view_seed, **samples)
+        return sense(view, setup.cfa).astype(np.float64)
 
     first, second = mosaic(0), mosaic(1)
     # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
     variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
-    mean, extra_variance = _missed_light(render_scene, small, cfa, grid)
-    return Probe(float((first + second).mean() / 2) + mean, float(variance) + extra_variance)
+    mean = float((first + second).mean() / 2)
+    film_light, paths = mean * pixels, 2 * PROBE_SAMPLES * small.height * small.width
+    known = straight_light(setup) + lit_light(setup, sampler_of_films(setup), film_light, paths)[0]
+    known += mirrored_light(
+        setup, film_light, paths, _depths_mm(setup.render_scene, grid), with_straight=True
+    )
+    bright = max(known, list(found), key=_noise)
+    missed = _missed(bright, paths, pixels)
+    # Of light in a single pixel two halves tell the variance badly, even if both have met it.
+    variance = max(float(variance) + _noise(missed) / pixels, _noise(bright) / pixels)
+    return Probe(mean + sum(row.light for row in missed) / pixels, variance, tuple(bright))
 
 
-def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, why_rendered: str) -> Plan:
-    """The cheaper way, or with a reason `why_rendered` the dense one."""
+def _missed(rows: Sequence[BrightLight], paths: float, pixels: int) -> list[BrightLight]:
+    """Of bright light the part that so many paths are likely not to have met."""
+    return [row._replace(light=row.light * math.exp(-row.hits(paths, pixels))) for row in rows]
+
+
+def _noise(rows: Sequence[BrightLight]) -> float:
+    """Variance of a single path, summed over the film's pixels."""
+    return sum(row.light * row.radiance for row in rows)
+
+
+def _choose_cheaper(
+    scopes: Scopes,
+    setup: Setup,
+    kind: str,
+    min_samples: int,
+    why_rendered: str,
+    found: Sequence[BrightLight] = (),
+) -> Plan:
+    """The cheaper way, or with a reason `why_rendered` the dense one; see `probe` for what was `found`."""
     render_scene, grid = setup.render_scene, scopes.grid
     pixels = grid.height * grid.width
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
@@ -189,7 +225,7 @@ def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, w
     budget, gain = scopes.photons_per_view, scopes.photons_per_radiance
     if budget is not None and not why_rendered and are_few(budget) and is_cheaper(budget, min_samples):
         return Plan(True, min_samples, budget, depths_mm=_first_hit_depths_mm(render_scene, grid))
-    probed = probe(render_scene, grid, scopes.cfa, PROBE_SEED)
+    probed = probe(setup, PROBE_SEED, found)
     # The virtual centre tells how many photons an exposure has, and what a unit of radiance has of a budget.
     if gain is None:
         assert budget is not None
@@ -213,45 +249,44 @@ def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, w
         name = "photons.budget" if budget is not None else "exposure"
         raise InputError(
             f"{name}: {per_view:.3g} photons per view are more than can be made without rendering noise; "
-            f"at most {most:.2g} can be"
+            f"at most {most:.2g} can be{_why_noisy(probed, pixels)}"
         )
     noise = probed.photon_noise(gain, samples)
     error = 0.0 if scopes.pixels is None else probed.light_error(samples * scopes.pixels)
     depths_mm = _first_hit_depths_mm(render_scene, grid) if thins else ()
-    return Plan(thins, samples, per_view, are_few(per_view), why_rendered, noise, error, depths_mm)
+    bright_light = tuple(
+        row for row in probed.bright_light if row.light >= LEAST_SHARE * probed.mean * pixels
+    )
+    how = thins, samples, per_view, are_few(per_view), why_rendered, noise, error, depths_mm
+    return Plan(*how, bright_light)
 
 
-def _missed_light(
-    render_scene: RenderScene, small: CameraGrid, cfa: str | None, grid: CameraGrid
-) -> tuple[float, float]:
-    """Mean radiance of a pixel, and variance of a path, that the probe's paths are likely not to have met.
-
-    A surface of radiance L that fills the share a of a pixel, small beside 1, has the mean a L and the
-    variance a L^2. The probe misses it with the probability exp(-n) if n of its paths hit it on average.
-    """
-    centre = replace(grid, rows=1, cols=1)
-    emission = EmissionSampler(Setup(render_scene, centre, cfa, 1))
-    if not emission.mass:
-        return 0.0, 0.0
-    rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=2)
-    arriving = emission.arriving(np.zeros(AIMED_POINTS, dtype=np.int64), rng)
-    pixels, paths = grid.height * grid.width, 2 * PROBE_SAMPLES * small.height * small.width
-    light = emission.mass / AIMED_POINTS / pixels  # of each that arrives, per pixel
-    number = len(emission.surfaces)
-    film_share = np.bincount(arriving.surface, light / arriving.radiance, minlength=number)
-    unmet = np.exp(-paths * film_share)[arriving.surface]
-    return float(light * unmet.sum()), float(light * (unmet * arriving.radiance).sum())
+def _why_noisy(probed: Probe, pixels: int) -> str:
+    """A clause on the bright light that makes most of the noise, if any does."""
+    worst = max(probed.bright_light, key=lambda row: _noise([row]), default=None)
+    if worst is None or _noise([worst]) < probed.variance * pixels / 2:
+        return ""
+    share = worst.light / (probed.mean * pixels)
+    return (
+        f", as {worst.what} gives {share:.0%} of the light from {worst.image_px:.2g} px of a film; make it "
+        "larger and as much dimmer, or leave it out"
+    )
 
 
 def _first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
     """Up to `DEPTH_STEPS` depths in mm that the corner cameras see in a coarse look; inf for nothing."""
-    hits = [first_hits_of_view(render_scene, _coarse(grid), k, l) for k, l in corners(grid)]
-    z_mm = np.concatenate([of_view.z_mm.ravel() for of_view in hits])
+    z_mm = _depths_mm(render_scene, grid)
     nearest = float(z_mm.min())
     if not nearest < math.inf:
         return (math.inf,)
     steps = np.unique(np.rint(DEPTH_STEPS * nearest / z_mm.astype(np.float64)))
     return tuple((DEPTH_STEPS * nearest / steps[steps > 0]).tolist())
+
+
+def _depths_mm(render_scene: RenderScene, grid: CameraGrid) -> np.ndarray:
+    """Depths (N,) in mm that the corner cameras see in a coarse look; inf for nothing."""
+    hits = [first_hits_of_view(render_scene, _coarse(grid), k, l) for k, l in corners(grid)]
+    return np.concatenate([of_view.z_mm.ravel() for of_view in hits])
 
 
 def _coarse(grid: CameraGrid) -> CameraGrid:

@@ -13,10 +13,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, FilmPoints, Setup, even_film_points
+from simgen.photons.bright_light import (
+    LEAST_SHARE,
+    SURE_HITS,
+    BrightLight,
+    lit_light,
+    mirrored_light,
+)
+from simgen.photons.candidates import (
+    Accepted,
+    CandidateSampler,
+    FilmPoints,
+    ImageCells,
+    Setup,
+    even_film_points,
+)
 from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
 from simgen.photons.emission_sampler import EmissionSampler, film_px
 from simgen.photons.majorant import DIM_SHARE, Majorant, fit
+from simgen.photons.mirror_images import KnownPlaces, MirrorImages, find_images
 from simgen.photons.scalar_sampler import ScalarSampler
 from simgen.photons.scopes import Scopes
 from simgen.photons.wavefront_sampler import WavefrontSampler
@@ -69,6 +84,13 @@ EXCESS_SHARE = 1e-5
 KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
 MIN_KEPT_SHARE = 1e-4
+MIN_FOUND_SHARE = 0.5
+"""Images in so many mirrors count as found if paths of the cameras find this share of what lamps send."""
+MAX_HIDDEN_SHARE = LEAST_SHARE / 4
+"""Share of a film's light that may be in images that were not found: curved glass gathers them, so that one
+camera gets several times the mean of the disc."""
+RARE = "light in rare paths, as by mirrors,"
+"""What rehearsals find above the bounds, whatever it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +99,22 @@ class Exploration:
 
     `majorant` is None if there is no light but what comes straight from something that shines; copy it before
     raising bounds. `is_bounded` is False if paths exceed every majorant too often: no thinning then.
-    `excess_share` is the share of the light that lay above the bounds in the last rehearsal.
+    `excess_share` is the share of the light that lay above the bounds in the last rehearsal. `aimed_at` is
+    bright light that few paths meet: places that the pilot was aimed at, and images of lamps that are drawn
+    apart, in `image_cells`. `unmet` is what no path can be aimed at, or what rehearsals found above every
+    bound.
     """
 
     majorant: Majorant | None
-    emission: EmissionSampler
+    known_places: KnownPlaces
     ambient: np.ndarray
     paths: int
     kept_share: float = KEPT_SHARE_GUESS
     is_bounded: bool = True
     excess_share: float = 0.0
+    image_cells: ImageCells | None = None
+    aimed_at: tuple[BrightLight, ...] = ()
+    unmet: tuple[BrightLight, ...] = ()
 
 
 def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
@@ -98,21 +126,29 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
     """
     scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
     emission = EmissionSampler(setup)
-    kept_of_emission = 0.0
-    if emission.mass:
-        view = np.arange(AIMED_RAYS) % setup.grid.view_count
-        path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-        accepted = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
-        kept_of_emission = accepted.photons.k.size / AIMED_RAYS
-    explored, mean = _send_pilot(setup, emission, scopes)
-    film_mass = 0.0
+    explored, mean = _send_pilot(setup, emission, scopes, emission.mass * _kept_share(setup, emission))
+    if explored.unmet:
+        return replace(explored, is_bounded=False)
+    known, film_mass = explored.known_places, 0.0
+    direct = known.mass * _kept_share(setup, known)
+    setup = replace(setup, image_cells=explored.image_cells)
     if explored.majorant is not None:
-        photons_wanted, direct = scopes.expected_photons(mean), emission.mass * kept_of_emission
+        photons_wanted = scopes.expected_photons(mean)
         explored, film_mass = _warm_up(setup, explored, explored.majorant, scopes, photons_wanted, direct)
-    if emission.mass:
-        kept = film_mass * explored.kept_share + emission.mass * kept_of_emission
-        explored = replace(explored, kept_share=max(kept / (film_mass + emission.mass), MIN_KEPT_SHARE))
+    if known.mass:
+        kept = (film_mass * explored.kept_share + direct) / (film_mass + known.mass)
+        explored = replace(explored, kept_share=max(kept, MIN_KEPT_SHARE))
     return explored
+
+
+def _kept_share(setup: Setup, known: EmissionSampler | MirrorImages | KnownPlaces) -> float:
+    """Share of the candidates of known places that is kept."""
+    if not known.mass:
+        return 0.0
+    view = np.arange(AIMED_RAYS) % setup.grid.view_count
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
+    accepted = known.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
+    return accepted.photons.k.size / AIMED_RAYS
 
 
 def sampler_class(setup: Setup) -> type[CandidateSampler]:
@@ -120,24 +156,36 @@ def sampler_class(setup: Setup) -> type[CandidateSampler]:
     return ScalarSampler if is_scalar(setup.render_scene.mi) else WavefrontSampler
 
 
-def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> tuple[Exploration, np.ndarray]:
-    """Find where there is light, and how much at most; and the mean radiance (C,) of all views."""
+def _send_pilot(
+    setup: Setup, emission: EmissionSampler, scopes: Scopes, direct: float
+) -> tuple[Exploration, np.ndarray]:
+    """Find where there is light, and how much at most; and the mean radiance (C,) of all views.
+
+    `direct` is the light of a film that comes straight from what shines.
+    """
     surroundings = np.zeros(setup.channels)
     if not is_scalar(setup.render_scene.mi):  # where candidates are guessed at
         surroundings = surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
     first, paths = _send_first_pilot(setup, surroundings)
     mean = first.light.mean(axis=0)
-    if not mean.any():
-        return Exploration(None, emission, surroundings, paths), mean
     ambient = surroundings + AMBIENT_SHARE * mean.mean()
-    # A colour that the pilot did not find may be there nevertheless.
-    dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
-    sampler = _sampler_of_films(setup, ambient)
-    photons = scopes.expected_photons(mean)
+    photons, sampler = scopes.expected_photons(mean), sampler_of_films(setup, ambient)
     rays = int(np.clip(RAYS_PER_PHOTON * photons / sampler.paths_each, FIRST_RAYS, MAX_RAYS))
     followed = int(FOLLOWED_SHARE * rays)
+    film_light = float(mean.mean()) * setup.grid.height * setup.grid.width + direct
+    known_paths = first.k.size + followed, int(photons / KEPT_SHARE_GUESS)
+    found, lit = _meet_bright_light(sampler, first, known_paths, film_light, emission)
+    found = replace(found, ambient=ambient, paths=paths)
+    if found.image_cells is not None:  # without the light of these
+        setup = replace(setup, image_cells=found.image_cells)
+        first, more = _send_first_pilot(setup, surroundings)
+        sampler, paths, mean = sampler_of_films(setup, ambient), paths + more, first.light.mean(axis=0)
+    if not mean.any() or found.unmet:
+        return found, mean
+    # A colour that the pilot did not find may be there nevertheless.
+    dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
-    samples = [first, sampler.trace(_spread_evenly(setup, rays, path_seed), followed, path_seed)]
+    samples = [first, lit, sampler.trace(_spread_evenly(setup, rays, path_seed), followed, path_seed)]
     aimed = _aimed_points(setup, emission)
     if aimed.view.size:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
@@ -150,12 +198,56 @@ def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> tupl
     known = Samples.joined(samples)
     layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
     paths += sampler.count_paths(rays + aimed.view.size, followed + aimed.view.size)
-    return Exploration(fit(setup.grid, layers, known, dim), emission, ambient, paths), mean
+    return replace(found, majorant=fit(setup.grid, layers, known, dim), paths=paths), mean
+
+
+def _meet_bright_light(
+    sampler: CandidateSampler,
+    first: Samples,
+    known_paths: tuple[int, int],
+    film_light: float,
+    emission: EmissionSampler,
+) -> tuple[Exploration, Samples]:
+    """What is known of bright light that few paths meet, without a majorant yet; and paths to what is lit
+    brightly.
+
+    `first` are paths that are spread evenly, `known_paths` the numbers of those of the pilot and of a
+    rehearsal, which look for all light that surfaces scatter, `film_light` is the sum of radiance over a
+    film. Images of lamps are drawn apart, where a compiled backend runs. What is not found there as it is
+    sent, and matters, is `unmet`.
+    """
+    setup, paths = sampler.setup, known_paths[0]
+    lit, traced = lit_light(setup, sampler, film_light, paths)
+    mirrored = mirrored_light(setup, film_light, paths, first.z_mm, with_straight=False)
+    film_light += sum(light.light for light in lit + mirrored)
+    pixels, images = setup.grid.height * setup.grid.width, None
+    is_rare = {True: paths, False: sum(known_paths)}  # by whether mirrors alone send it
+    rare = [row for row in mirrored if row.hits(is_rare[row.arrivals is not None], pixels) < SURE_HITS]
+    seen = [row for row in rare if row.arrivals is not None]
+    unmet = [row for row in rare if row.arrivals is None]
+    if seen and isinstance(sampler, WavefrontSampler):
+        images = find_images(sampler, seen)
+    known = KnownPlaces([emission] if images is None else [emission, images])
+    if images is None:
+        unmet += seen
+    else:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=1 << 20)
+        found = images.light_by_bounces(AIMED_RAYS, path_seed)
+        sent = np.bincount([row.bounces for row in seen], [row.light for row in seen], minlength=found.size)
+        # What the cameras see of a lamp differs from what arrives around them, but not by a half.
+        hidden = [row for row in seen if found[row.bounces] < MIN_FOUND_SHARE * sent[row.bounces]]
+        if sum(row.light for row in hidden) > MAX_HIDDEN_SHARE * film_light:
+            return Exploration(None, known, np.zeros(setup.channels), 0, unmet=tuple(hidden)), traced
+    if sum(row.light for row in unmet) <= LEAST_SHARE * film_light:
+        unmet = []
+    cells = None if images is None else images.cells
+    outcome = {"image_cells": cells, "aimed_at": tuple(lit + seen), "unmet": tuple(unmet)}
+    return Exploration(None, known, np.zeros(setup.channels), 0, **outcome), traced
 
 
 def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, int]:
     """Paths spread evenly, more and more of them until some find light; and how many they were."""
-    sampler = _sampler_of_films(setup, surroundings)
+    sampler = sampler_of_films(setup, surroundings)
     round_number, rays, paths = 0, FIRST_RAYS, 0
     while True:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
@@ -223,8 +315,9 @@ def _trace_misses(sampler: CandidateSampler, points: FilmPoints, seed: int) -> S
     return samples._replace(light=samples.guess)
 
 
-def _sampler_of_films(setup: Setup, ambient: np.ndarray) -> CandidateSampler:
-    """A sampler that knows of nothing but the films."""
+def sampler_of_films(setup: Setup, ambient: np.ndarray | None = None) -> CandidateSampler:
+    """A sampler that knows of nothing but the films; it guesses light `ambient` (C,) all around, or none."""
+    ambient = np.zeros(setup.channels) if ambient is None else ambient
     nowhere = layers_for(setup.grid, tile_px_for(setup.grid, MAX_RAYS), np.array([np.inf]))
     flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
     return sampler_class(setup)(setup, flat, [np.arange(4)], ambient)
@@ -239,6 +332,7 @@ def _warm_up(
     `CandidateSampler.mass`. What is known then, and the mass of the films.
     """
     paths, kept_share, excess_share, is_bounded = explored.paths, KEPT_SHARE_GUESS, 0.0, False
+    rare = list[BrightLight]()
     allowed, shares = MAX_MISSING_SD / math.sqrt(max(photons, 1.0)), list[float]()
     groups, make_sampler = scopes.cell_groups, sampler_class(setup)
     for turn in range(-WARM_UP_ROUNDS, MAX_REHEARSALS):
@@ -264,12 +358,29 @@ def _warm_up(
         above = float(np.maximum(ratio - 1, 0).sum()) / max(float(ratio.sum()), 1.0)
         shares.append(above * of_films / (of_films + direct))
         excess_share = float(np.mean(shares[-MEAN_OF:]))
+        rare += _above_bounds(accepted, float(sampler.mass.mean()) / number, sampler.colours)
         is_bounded = (turn == 0 or turn >= MEAN_OF - 1) and excess_share <= allowed
         if is_bounded:
             break
     mass = make_sampler(setup, majorant, groups, explored.ambient).mass.mean()
     outcome = {"kept_share": kept_share, "is_bounded": is_bounded, "excess_share": excess_share}
+    if not is_bounded:  # rehearsals are draws of the same light
+        outcome["unmet"] = tuple(row._replace(light=row.light / len(shares)) for row in rare)
     return replace(explored, paths=paths, **outcome), float(mass)
+
+
+def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.ndarray) -> list[BrightLight]:
+    """Light of a rehearsal's paths that exceeded their bounds, as it is on a film: one row, or none.
+
+    A path that may bring B at most stands for the mass per candidate over B of the film's pixels.
+    """
+    exceeding = accepted.exceeding
+    if not exceeding.k.size:
+        return []
+    colour = colours[exceeding.row % 2 * 2 + exceeding.col % 2]
+    radiance = exceeding.light[np.arange(colour.size), colour]
+    ratio = accepted.ratio[accepted.ratio > 1].astype(np.float64)
+    return [BrightLight.of(RARE, ratio * mass_per_candidate, radiance)]
 
 
 def _factor(ratio: np.ndarray) -> float:

@@ -102,6 +102,7 @@ def draw_from_views(
         "rendering_noise_allowed": MAX_NOISE_SHARE,
         "views_without_light": int((energies <= 0).all(axis=1).sum()),
         "normaliser_standard_error": plan.normaliser_error,
+        "bright_light_forecast": [light.log for light in plan.bright_light],
     }
 
 

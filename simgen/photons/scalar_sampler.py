@@ -35,8 +35,8 @@ class ScalarSampler(CandidateSampler):
         followed = self.majorant.owner_of(self._samples(candidates, z_mm)) == candidates.entry
         candidates, candidate = _take(candidates, followed), candidate[followed]
         object_id, z_mm = object_id[followed], z_mm[followed]
-        light = self._follow(candidates, rng, seed)
-        self.require_finite(light.sum(axis=1), object_id)
+        light = self._follow(candidates, rng)
+        self.require_finite(light.sum(axis=1), candidates, object_id)
         own, place = light[np.arange(len(light)), candidates.colour], (candidates.entry, candidates.colour)
         bound = self.majorant.bound[place]
         floor = 0.0 if self.below is None else self.below.bound[place]
@@ -60,12 +60,12 @@ class ScalarSampler(CandidateSampler):
         inside, lens_point = np.ones(view.size, dtype=bool), self._lens_points(rng, view.size)
         candidates = Candidates(k, l, row, col, i - 0.5, j - 0.5, entry, colour, inside, lens_point)
         if self.setup.render_scene.filters is None:
-            light = self._follow(candidates, rng, seed)
+            light = self._follow(candidates, rng)
         else:  # once in each colour
             turns = [candidates._replace(colour=np.full_like(colour, c)) for c in range(self.setup.channels)]
-            light = np.sum([self._follow(one, rng, seed + turn) for turn, one in enumerate(turns)], axis=0)
+            light = np.sum([self._follow(one, rng) for one in turns], axis=0)
         object_id, z_mm = self._first_hits(candidates)
-        self.require_finite(light.sum(axis=1), object_id)
+        self.require_finite(light.sum(axis=1), candidates, object_id)
         return self._samples(candidates, z_mm, light)
 
     def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> Candidates:
@@ -110,18 +110,21 @@ class ScalarSampler(CandidateSampler):
                 z_mm[number] = render_scene.frame.z_mm(hit.p)
         return object_id, z_mm
 
-    def _follow(self, candidates: Candidates, rng: np.random.Generator, seed: int) -> np.ndarray:
+    def _follow(self, candidates: Candidates, rng: np.random.Generator) -> np.ndarray:
         """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0.
 
         What the first hit shines itself is left out.
         """
         render_scene = self.setup.render_scene
         sampler = render_scene.mi.load_dict({"type": "independent"})
-        sampler.seed(seed, 1)
         integrate, scene = render_scene.scene.integrator().sample, render_scene.scene
+        # Mitsuba's sampler takes 32 bits. Each candidate has its own, so that chance makes paths of single
+        # candidates the same and never those of a whole draw.
+        path_seeds = rng.integers(1 << 32, size=candidates.k.size).tolist()
 
-        def radiance(ray: Any) -> np.ndarray:
+        def radiance(ray: Any, path_seed: int) -> np.ndarray:
             """Mean of all paths, less what shines at the first hit; no less than 0 for rounding."""
+            sampler.seed(path_seed, 1)
             total = np.array(sum(integrate(scene, sampler, ray)[0] for _ in range(PATHS))) / PATHS
             if not render_scene.shining:
                 return total
@@ -131,13 +134,13 @@ class ScalarSampler(CandidateSampler):
 
         if render_scene.filters is None:
             rays, kind = self._rays(candidates), np.dtype((np.float64, 3))
-            rgb = np.fromiter(map(radiance, rays), kind, candidates.k.size)
+            rgb = np.fromiter(map(radiance, rays, path_seeds), kind, candidates.k.size)
             return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
         wavelength_nm, weight = render_scene.filters.draw(candidates.colour, rng.random(candidates.k.size))
         light = np.zeros((candidates.k.size, self.setup.channels))
-        for number, ray in enumerate(self._rays(candidates)):
+        for number, (ray, path_seed) in enumerate(zip(self._rays(candidates), path_seeds, strict=True)):
             ray.wavelengths = wavelength_nm[number].tolist()
-            light[number, candidates.colour[number]] = weight[number] @ radiance(ray)
+            light[number, candidates.colour[number]] = weight[number] @ radiance(ray, path_seed)
         return light
 
     def _rays(self, candidates: Candidates) -> Iterator[Any]:

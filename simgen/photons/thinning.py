@@ -113,7 +113,8 @@ class _Drawing:
     def __init__(
         self, setup: Setup, scopes: Scopes, seed: int, explored: Exploration, report: Report
     ) -> None:
-        self.setup, self.scopes, self.seed, self.report = setup, scopes, seed, report
+        self.setup = replace(setup, image_cells=explored.image_cells)
+        self.scopes, self.seed, self.report = scopes, seed, report
         self.explored, self.kept_share = explored, explored.kept_share
         self.totals = scopes.draw_totals(seed)
         self.number = np.zeros(self.totals.size, dtype=np.int64)
@@ -123,7 +124,7 @@ class _Drawing:
     def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
         """Every photon one by one: of the exposure `gain`, or without one as many as each scope wants."""
         photons = _Photons(wanted)
-        if self.majorant is not None or self.explored.emission.mass:
+        if self.majorant is not None or self.explored.known_places.mass:
             if gain is None:
                 self._fill_budgets(photons)
             else:
@@ -170,6 +171,7 @@ class _Drawing:
             "bound_raised": tally["raises"],
             "share_above_bound_before": float(f"{self.explored.excess_share:.3g}"),
             "paths": tally["paths"],
+            "aimed_at": [light.log for light in self.explored.aimed_at],
             "scopes_without_light": int(((self.number == 0) & (self.totals > 0)).sum()),
         }
 
@@ -237,7 +239,7 @@ class _Drawing:
     def _mass(self, sampler: CandidateSampler | None) -> np.ndarray:
         """Candidates of each group (G,) in one view and unit of time, of films and of what shines."""
         of_films = np.zeros(len(self.scopes.cell_groups)) if sampler is None else sampler.mass
-        return of_films + self.explored.emission.mass
+        return of_films + self.explored.known_places.mass
 
     def _round(
         self,
@@ -252,7 +254,7 @@ class _Drawing:
         """Candidates of some scopes, from time `begin` on: of films, and with `emits` of what shines."""
         numbers = {"seed": self.seed, "round_number": self.tally["rounds"]}
         rng = seeds.generator(stage="candidate numbers", **numbers)
-        scopes, emission, tally = self.scopes, self.explored.emission, self.tally
+        scopes, known, tally = self.scopes, self.explored.known_places, self.tally
         candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
         def add(part: Accepted, number: np.ndarray, paths: int) -> None:
@@ -270,14 +272,14 @@ class _Drawing:
             path_seed = seeds.integer(stage="candidate paths", **numbers)
             part = sampler.try_candidates(scopes.group[scope], view, path_seed)
             add(part, number, sampler.count_paths(scope.size, part.ratio.size))
-        if emits and emission.mass:
-            number = rng.poisson(duration * emission.mass)
+        if emits and known.mass:
+            number = rng.poisson(duration * known.mass)
             scope = some.repeat(number)
             view = scopes.view[scope]
             if scopes.is_of_all_views:
                 view = rng.integers(0, self.setup.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            part = emission.try_candidates(scopes.group[scope], view, scopes.cell_groups, path_seed)
+            part = known.try_candidates(scopes.group[scope], view, scopes.cell_groups, path_seed)
             add(part, number, scope.size)
         tally["rounds"] += 1
         if emits:

@@ -19,15 +19,13 @@ from simgen.photons.candidates import (
 )
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
-from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned
-from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
+from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned, whole
+from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, mirrored_radiance, radiance_along
+from simgen.renderer.random_numbers import RandomNumbers, streams_for
 from simgen.renderer.wavelengths import light_of, of_colour
 from simgen.sensor.photon_table import PhotonTable
 
 LEAST_GUESS = 1e-30
-PATH_SEED_MASK = 0x9E3779B9
-"""Flips 20 of the 32 bits (2^32 over the golden ratio, which has no pattern) of the seed that candidates are
-drawn with: their paths get random numbers of their own."""
 
 
 class WavefrontSampler(CandidateSampler):
@@ -80,7 +78,7 @@ class WavefrontSampler(CandidateSampler):
         setup, mi, dr = self.setup, self.mi, self.dr
         if group.size == 0:
             return nothing(setup.channels)
-        sampler = self._sampler(seed, group.size)
+        sampler = streams_for(mi, seed, group.size)
         candidates = self._draw(sampler, unsigned(mi, group), view)
         first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
         where = candidates.entry * setup.channels + candidates.colour
@@ -97,7 +95,7 @@ class WavefrontSampler(CandidateSampler):
         if len(rest) == 0:
             return nothing(setup.channels)
         candidates, first = _take(candidates, rest), _take_hits(first, rest)
-        light = self._follow(candidates, first, seed)
+        light = self._follow(candidates, first, seed, 0)
         most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
         radiance = self._in_own_colour(light, candidates)
         is_kept = dr.gather(mi.Float, chance, rest) * (most - floor) < radiance - floor
@@ -107,7 +105,7 @@ class WavefrontSampler(CandidateSampler):
         photon, hit = _take(candidates, kept), _take_hits(first, kept)
         candidate = dr.gather(mi.UInt32, rest, kept)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
-        self._require_finite(ratio, first)
+        self._require_finite(ratio, candidates, first)
         exceeding = nothing(setup.channels).exceeding
         if len(over):
             exceeding = self._exceeding(candidates, first, light, over)
@@ -119,7 +117,7 @@ class WavefrontSampler(CandidateSampler):
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         mi, dr = self.mi, self.dr
-        candidates = self._at(self._sampler(seed, points.view.size), points)
+        candidates = self._at(streams_for(mi, seed, points.view.size), points)
         some = dr.arange(mi.UInt32, min(follow, points.view.size))
         guess, light = [0.0] * self.setup.channels, [0.0] * self.setup.channels
         z_mm = None
@@ -127,13 +125,33 @@ class WavefrontSampler(CandidateSampler):
             recoloured = candidates._replace(colour=colour)
             first = self._hit_first(recoloured)
             followed, first_of_followed = _take(recoloured, some), _take_hits(first, some)
-            radiance = self._follow(followed, first_of_followed, seed + turn)
-            self._require_finite(dr.sum(radiance), first_of_followed)
+            radiance = self._follow(followed, first_of_followed, seed, turn)
+            self._require_finite(dr.sum(radiance), followed, first_of_followed)
             guess = [a + b for a, b in zip(guess, self._per_colour(first.guess, recoloured), strict=True)]
             light = [a + b for a, b in zip(light, self._per_colour(radiance, followed), strict=True)]
             dr.eval(guess, light)
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
+
+    def trace_mirrored(
+        self, points: FilmPoints, above: float, seed: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What is brighter than `above` and seen by mirrors alone through these points of films (N,).
+
+        Its radiance (N,) in each pixel's own colour and the number of mirrors before it; and the object and
+        depth of the first hit.
+        """
+        mi, setup = self.mi, self.setup
+        candidates = self._at(streams_for(mi, seed, points.view.size), points)
+        first = self._hit_first(candidates)
+        self.dr.make_opaque(*candidates, vars(first))
+        sampler = streams_for(mi, seed, points.view.size, part=1)
+        path = self._rays(candidates), first.record, sampler, setup.max_depth, opaque(mi.Float, above)
+        light, bounces = mirrored_radiance(setup.render_scene, *path)
+        radiance = self._in_own_colour(light, candidates)
+        self.dr.eval(radiance, bounces)
+        object_id = setup.render_scene.object_of_shape[np.array(first.shape)]
+        return np.array(radiance), np.array(bounces), object_id, np.array(first.z_mm)
 
     def _upload_bounds(self, majorant: Majorant | None) -> tuple[Any, Any]:
         """Both bounds of every entry; 0 without a majorant."""
@@ -142,12 +160,7 @@ class WavefrontSampler(CandidateSampler):
             return floats(self.mi, nowhere), floats(self.mi, nowhere)
         return floats(self.mi, majorant.bound), floats(self.mi, majorant.radiance_ratio_bound)
 
-    def _sampler(self, seed: int, size: int) -> Any:
-        sampler = self.mi.load_dict({"type": "independent"})
-        sampler.seed(seed, size)
-        return sampler
-
-    def _draw(self, sampler: Any, group: Any, view_numbers: np.ndarray | None) -> Candidates:
+    def _draw(self, sampler: RandomNumbers, group: Any, view_numbers: np.ndarray | None) -> Candidates:
         """One candidate for each of these groups: tile and cell by the bound, the rest evenly."""
         mi, dr, grid = self.mi, self.dr, self.setup.grid
         if view_numbers is None:
@@ -185,7 +198,7 @@ class WavefrontSampler(CandidateSampler):
             k, l, row, col, row_px, col_px, entry, colour, inside, lens_point, wavelength_sample
         )
 
-    def _at(self, sampler: Any, points: FilmPoints) -> Candidates:
+    def _at(self, sampler: RandomNumbers, points: FilmPoints) -> Candidates:
         """Candidates of no entry at these points."""
         mi, dr, number = self.mi, self.dr, points.view.size
         k, l = np.divmod(points.view, self.setup.grid.cols)
@@ -203,7 +216,7 @@ class WavefrontSampler(CandidateSampler):
             wavelength_sample=wavelength_sample,
         )
 
-    def _lens_point(self, sampler: Any) -> Any:
+    def _lens_point(self, sampler: RandomNumbers) -> Any:
         lens = self.setup.rig.lens
         if lens is None:
             return None
@@ -251,25 +264,45 @@ class WavefrontSampler(CandidateSampler):
         self.dr.eval(vars(first))
         return first
 
-    def _follow(self, candidates: Candidates, first: FirstHits, seed: int) -> Any:
-        """Radiance along one path from each first hit, as rays carry it."""
+    def _follow(self, candidates: Candidates, first: FirstHits, seed: int, turn: int) -> Any:
+        """Radiance along one path from each first hit, as rays carry it; each `turn` has other numbers."""
         self.dr.make_opaque(*candidates, vars(first))
         # Not the candidates' numbers, which decided which of them are followed.
-        sampler = self._sampler(seed ^ PATH_SEED_MASK, len(candidates.k))
-        rays, longest = self._rays(candidates), self.setup.max_depth
-        light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest)
+        sampler = streams_for(self.mi, seed, len(candidates.k), part=1 + turn)
+        rays, longest, left_out = self._rays(candidates), self.setup.max_depth, self._left_out(candidates)
+        light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest, left_out)
         self.dr.eval(light)
         return light
+
+    def _left_out(self, candidates: Candidates) -> tuple[Any, Any] | None:
+        """Which candidates lie in cells in which images of lamps are drawn apart, and what of them."""
+        cells, mi, dr, grid = self.setup.image_cells, self.mi, self.dr, self.setup.grid
+        if cells is None:
+            return None
+        row, col = (
+            mi.UInt64(dr.floor((place + 0.5) * cells.per_px))
+            for place in (candidates.row_px, candidates.col_px)
+        )
+        view = mi.UInt64(candidates.k) * grid.cols + mi.UInt64(candidates.l)
+        number = (view * (grid.height * cells.per_px) + row) * (grid.width * cells.per_px) + col
+        known = whole(mi, cells.number)
+        low, high = mi.UInt32(0), mi.UInt32(cells.number.size - 1)
+        for _ in range(cells.number.size.bit_length()):
+            middle = (low + high) >> 1
+            before = gathered(known, middle) < number
+            low, high = dr.select(before, dr.minimum(middle + 1, high), low), dr.select(before, high, middle)
+        return gathered(known, low) == number, opaque(mi.Float, cells.above)
 
     def _rays(self, candidates: Candidates) -> Any:
         at = candidates.k, candidates.l, candidates.row_px, candidates.col_px, candidates.lens_point
         ray = film_rays(self.setup.render_scene, self.setup.rig, *at)
         return self.light.aim(ray, candidates.colour, candidates.wavelength_sample)
 
-    def _require_finite(self, radiance: Any, first: FirstHits) -> None:
+    def _require_finite(self, radiance: Any, candidates: Candidates, first: FirstHits) -> None:
         values = np.array(radiance)
         if not np.isfinite(values).all():
-            self.require_finite(values, self.setup.render_scene.object_of_shape[np.array(first.shape)])
+            object_id = self.setup.render_scene.object_of_shape[np.array(first.shape)]
+            self.require_finite(values, candidates, object_id)
 
     def _per_colour(self, radiance: Any, candidates: Candidates) -> list[Any]:
         """Radiance that rays carry in each colour of the sensor."""

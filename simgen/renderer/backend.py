@@ -215,6 +215,7 @@ unsigned = partial(_upload, "UInt32", np.uint32)
 signed = partial(_upload, "Int32", np.int32)
 floats = partial(_upload, "Float", np.float32)
 doubles = partial(_upload, "Float64", np.float64)
+whole = partial(_upload, "UInt64", np.uint64)
 """Each makes a flat array of `mi` and `values` of any shape."""
 
 

@@ -26,6 +26,12 @@ NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
 POINTS = 1 << 12
 """Points on the surface of an object at which its light is summed up."""
+NARROW_DEG = 1.0
+"""A spot lamp whose cutoff is below this is a projector: Mitsuba compares cosines in single precision, by
+which a spot of 1 degree is right to 4e-4, of 0.1 degrees to 4e-2, and one of 0.01 degrees gives no light."""
+BEAM_PX, BEAM_PARTS, BEAM_MARGIN = 128, 8, 1.02
+"""Side of the beam's picture, parts of a pixel's side that it is averaged over, and its half width over the
+cutoff."""
 BALL_ROWS = 16
 """Rows of the triangles that a ball's points are drawn on, before they are moved onto the ball itself."""
 
@@ -124,6 +130,8 @@ def light_plugin(
         case lights.PointLight():
             position = frame.points(np.array(light.position_mm)).tolist()
             return {"type": "point", "position": position, "intensity": bright(light.intensity_cd, per_cd)}
+        case lights.SpotLight() if light.cutoff_deg < NARROW_DEG:
+            return _narrow_spot(mi, light, gain * per_cd, T(frame.rigid_pose(_lamp_pose(light))))
         case lights.SpotLight():
             angles = {"beam_width": light.beam_deg, "cutoff_angle": light.cutoff_deg}
             to_world, intensity = T(frame.rigid_pose(_lamp_pose(light))), bright(light.intensity_cd, per_cd)
@@ -143,6 +151,28 @@ def light_plugin(
             emitter = {"type": "area", "radiance": bright(light.luminance_cd_m2)}
             to_world = frame.pose(mi, T(area_light_pose(light)))
             return {"type": "rectangle", "to_world": to_world, "emitter": emitter, "bsdf": black}
+
+
+def _narrow_spot(mi: Any, light: lights.SpotLight, gain: float, to_world: Any) -> dict[str, Any]:
+    """A spot lamp as a projector of its beam's picture. Raises `InputError` in spectral mode."""
+    if is_spectral(mi):
+        raise InputError(
+            f"lights: a spot lamp with a cutoff_deg below {NARROW_DEG:g} shines only in linear sRGB; make it "
+            "wider, or leave sensor.camera out"
+        )
+    reach_deg = BEAM_MARGIN * light.cutoff_deg
+    parts = BEAM_PX * BEAM_PARTS
+    side = np.tan(np.radians(reach_deg)) * ((np.arange(parts) + 0.5) / (parts / 2) - 1)
+    slope = np.hypot(*np.meshgrid(side, side))
+    beyond_deg = light.cutoff_deg - np.degrees(np.arctan(slope))
+    share = np.clip(beyond_deg / (light.cutoff_deg - light.beam_deg), 0, 1)
+    # A projector of irradiance E has the intensity pi E / cos^3.
+    share *= (1 + slope**2) ** -1.5 / np.pi
+    share = share.reshape(BEAM_PX, BEAM_PARTS, BEAM_PX, BEAM_PARTS).mean(axis=(1, 3))
+    rgb = np.array(radiance_plugin(mi, gain * light.intensity_cd, light.illuminant)["value"])
+    bitmap = linear_bitmap(mi, np.ascontiguousarray(share[..., None] * rgb, dtype=np.float32))
+    picture = {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
+    return {"type": "projector", "irradiance": picture, "fov": 2 * reach_deg, "to_world": to_world}
 
 
 def area_light_pose(light: lights.AreaLight) -> np.ndarray:

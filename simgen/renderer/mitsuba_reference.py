@@ -33,6 +33,8 @@ OF_RECIPES = ("Sensor", "Film", "Sampler", "ReconstructionFilter", "Integrator")
 """What of a file is not built: recipes say how a scene is seen."""
 REQUIRED = {"bitmap": "filename", "volume": "volume", "blendbsdf": "weight"}
 """What plugins use without a look at whether the file has it: a crash would end this process."""
+MIN_CUTOFF_DEG = 0.2
+"""Mitsuba compares cosines in single precision: a spot of this cutoff has its light to 1 %."""
 LIGHT_SAMPLES = 1 << 14
 """Directions in which each light is looked for, to measure what it gives a plane."""
 FLAT = 1e-4
@@ -49,6 +51,8 @@ class Reference:
     names: tuple[str, ...]
     has_media: bool
     has_instances: bool
+    foggy_sensor: str | None
+    """Id of the sensor that is the virtual centre, if it stands in a medium."""
 
     def illuminance_lux(self, z_mm: float) -> float:
         """Illuminance, in the unit of the file's lights, of a surface at (0, 0, z) that faces the cameras.
@@ -66,13 +70,15 @@ class Reference:
             total += float((radiance[:, :3] @ LUMINANCE * cosine).mean())
         return total
 
-    def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> Any:
+    def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> tuple[Any, Any]:
         """Mitsuba's scene of all that the file has, its lights `gain` times as bright, and of `own` by id.
+
+        And the medium that the cameras stand in, None for air.
 
         Raises `InputError` with what Mitsuba says of a plugin, a parameter or a file.
         """
         mi = self.mi
-        config, state = _parse(mi, self.path)
+        config, state = _parse(mi, self.path, self.foggy_sensor)
         root, ids = state.root.props, iter(self.names)
         for node in filter(_is_object, _children(mi, state, state.root).values()):
             node.props.set_id(next(ids))
@@ -92,7 +98,7 @@ class Reference:
             for name in ["scale"] if "scale" in names else names:
                 values[name] = values[name] * gain
             values.update()
-        return scene
+        return scene, next((sensor.get_medium() for sensor in scene.sensors()), None)
 
     def shining_surfaces(
         self, scene: Any, ids: Mapping[str, int], filters: Filters | None
@@ -124,15 +130,19 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     ids = [node.props.id() or Path(_properties(node).get("filename", "")).stem for node in shapes]
     has_media = any(_kind(node) == "Medium" for node in state.nodes)
     has_instances = any(node.props.plugin_name() == "instance" for node in state.nodes)
-    frame, names = _frame(mi, file, path, state), tuple(names_of_objects(ids))
+    (frame, sensor), names = _frame(mi, file, path, state), tuple(names_of_objects(ids))
     check_unscored(file.unscored, names, str(path))
-    return Reference(mi, path, frame, names, has_media, has_instances)
+    foggy_sensor = None
+    if sensor is not None and "Medium" in map(_kind, _children(mi, state, sensor).values()):
+        foggy_sensor = sensor.props.id()
+    return Reference(mi, path, frame, names, has_media, has_instances, foggy_sensor)
 
 
-def _parse(mi: Any, path: Path) -> tuple[Any, Any]:
+def _parse(mi: Any, path: Path, sensor: str | None = None) -> tuple[Any, Any]:
     """Mitsuba's settings and tree of a file, whose own files are named by their whole paths.
 
-    What recipes have instead is not built: it is cut off the tree, whose nodes have the sensors still. Raises
+    What recipes have instead is not built: it is cut off the tree but for one `sensor`, whose medium is of
+    interest; the nodes have all sensors still. Raises
     `InputError` for plugins and materials that Mitsuba does not ship, and for what would end this process.
     """
     parser, resolver = mi.parser, mi.FileResolver()
@@ -154,9 +164,9 @@ def _parse(mi: Any, path: Path) -> tuple[Any, Any]:
         raise InputError(f"{path}: expected a <scene>, not a single plugin")
     for node in state.nodes:
         for key, child in _children(mi, state, node).items():
-            if _kind(child) in OF_RECIPES:
+            if _kind(child) in OF_RECIPES and child.props.id() != sensor:
                 del node.props[key]
-        if _kind(node) in (*OF_RECIPES, "Scene"):
+        if _kind(node) in (*OF_RECIPES, "Scene") and node.props.id() != sensor:
             continue
         values = _properties(node)
         if fault := _fault(node.props.plugin_name(), values, Path(mi.__file__).parent):
@@ -175,6 +185,8 @@ def _fault(plugin: str, values: dict[str, Any], own_files: Path) -> str:
         return f"{plugin!r} is none of Mitsuba's plugins for scene files"
     if isinstance(material, str) and material not in _names_in(own_files / "data/ior") | {"none"}:
         return f"{material!r} is none of Mitsuba's materials"
+    if plugin == "spot" and values.get("cutoff_angle", MIN_CUTOFF_DEG) < MIN_CUTOFF_DEG:
+        return f"a spot is right from a cutoff_angle of {MIN_CUTOFF_DEG:g} degrees on; use a projector"
     return "" if needed is None or needed in values else f"a {plugin} needs a {needed}"
 
 
@@ -219,8 +231,8 @@ def _properties(node: Any) -> dict[str, Any]:
     return values
 
 
-def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
-    """Where the world's axes are in those of the file."""
+def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> tuple[WorldFrame, Any]:
+    """Where the world's axes are in those of the file, and the node of the sensor if they are of one."""
     unit, middle = 1 / file.unit_mm, np.zeros(3)
     if file.place_at_mm is not None or file.fit_mm is not None:
         scene = _instantiate(mi, *_parse(mi, path), path)
@@ -231,7 +243,7 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
         if file.fit_mm is not None:
             unit = float((high - low).max()) / file.fit_mm
     if file.place_at_mm is not None:
-        return WorldFrame(UPRIGHT, unit, middle - unit * UPRIGHT @ np.array(file.place_at_mm))
+        return WorldFrame(UPRIGHT, unit, middle - unit * UPRIGHT @ np.array(file.place_at_mm)), None
     cameras = {node.props.id(): node for node in state.nodes if _kind(node) == "Sensor"}
     if file.camera is not None and file.camera not in cameras:
         raise InputError(f"{path}: there is no sensor {file.camera!r}{suggestion(file.camera, cameras)}")
@@ -244,7 +256,7 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
     left = np.cross(pose[:3, 1], forward)
     left /= np.linalg.norm(left)
     axes = np.column_stack([left, np.cross(forward, left), forward]) @ AXES_OF_CAMERA
-    return WorldFrame(axes, unit, pose[:3, 3])
+    return WorldFrame(axes, unit, pose[:3, 3]), node
 
 
 def _flat_triangles(mesh: Any) -> np.ndarray | None:

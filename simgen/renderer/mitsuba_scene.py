@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.types.camera_grid import CameraGrid
 from simgen.assets.asset_files import Assets, read_assets
 from simgen.assets.triangles import triangles_of
 from simgen.renderer import emission
@@ -33,7 +34,8 @@ class RenderScene:
     `names` are those of objects by id, from 1; those of `unscored` count in no score. `filters` are what the
     camera's pixels see of spectra, None where light is linear sRGB. `shining` is all that shines and can be
     seen but for what is all around, and `why_rendered` a clause on what the tracer of single photons does not
-    cover. With `has_instances` some objects are instances of a group of shapes.
+    cover. With `has_instances` some objects are instances of a group of shapes. The cameras stand in
+    `medium`, None for air.
     """
 
     mi: Any
@@ -46,6 +48,7 @@ class RenderScene:
     frame: WorldFrame = field(default_factory=WorldFrame)
     has_instances: bool = False
     unscored: frozenset[int] = frozenset()
+    medium: Any = None
 
 
 def build(
@@ -71,7 +74,7 @@ def build(
     unscored = {thing.name for thing in scene.objects if not thing.scored}
     if scene.mitsuba is not None:
         unscored.update(scene.mitsuba.unscored)
-    referenced_lux, has_media, has_instances = 0.0, False, False
+    referenced_lux, has_media, has_instances, medium = 0.0, False, False, None
     if reference is not None:
         has_media, has_instances = reference.has_media, reference.has_instances
         for name in set(names.values()) & set(reference.names):
@@ -98,7 +101,7 @@ def build(
     shining, why_rendered = list(emission.shining_surfaces(mi, scene, assets, gain, filters)), ""
     integrator = {"type": "volpath" if has_media else "path", "max_depth": max_depth}
     if reference is not None:
-        loaded = reference.build(plugins, integrator, gain)
+        loaded, medium = reference.build(plugins, integrator, gain)
         surfaces, why_rendered = reference.shining_surfaces(loaded, ids, filters)
         shining += surfaces
     else:
@@ -111,7 +114,7 @@ def build(
     object_of_shape = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
     object_of_shape[numbers] = [ids.get(shape.id(), 0) for shape in loaded.shapes()]
     seen = mi, loaded, object_of_shape, names, filters, tuple(shining), why_rendered, frame, has_instances
-    return RenderScene(*seen, frozenset(number for number, name in names.items() if name in unscored))
+    return RenderScene(*seen, frozenset(number for number, name in names.items() if name in unscored), medium)
 
 
 def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:
@@ -172,8 +175,15 @@ def shape_number(render_scene: RenderScene, hit: Any) -> Any:
     return dr.select(instance != 0, instance, number)
 
 
-def not_finite(render_scene: RenderScene, number: int) -> str:
-    """The sentence for light of an object (0: none) that is no finite number."""
+def not_finite(
+    render_scene: RenderScene, number: int, view: tuple[int, int], pixel: tuple[int, int], grid: CameraGrid
+) -> str:
+    """The sentence for light of an object (0: none) in a pixel of a view that is no finite number."""
     name = render_scene.names.get(number)
     what = "what is seen beside the objects" if name is None else f"object '{name}'"
-    return f"{what}: its radiance is not a finite number; make tiny lamps larger, or move them away from it"
+    # The size tells views of the dataset from the coarse ones that are looked at before.
+    where = f"row {pixel[0]}, column {pixel[1]} of view {view}, of {grid.height} x {grid.width} px"
+    return (
+        f"{what}: its radiance in {where}, is not a finite number; make tiny lamps larger, or move them away "
+        "from it"
+    )

@@ -150,14 +150,55 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
     return [around] if varies else []
 
 
-def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
+def mirrored_radiance(
+    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int, above: Any
+) -> tuple[Any, Any]:
+    """Radiance that one path from each first hit finds of what is brighter than `above`, in any colour, and
+    seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request.
+
+    And the number of mirrors and clear surfaces before the last that it has found.
+    """
+    mi, dr, scene, context = render_scene.mi, load_drjit(), render_scene.scene, render_scene.mi.BSDFContext()
+
+    def lengthen(
+        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, found: Any, sampler: Any
+    ) -> tuple[Any, ...]:
+        choice, pair = sampler.next_1d(active), sampler.next_2d(active)
+        sample, of_segment = hit.bsdf(ray).sample(context, hit, choice, pair, active)
+        active &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta) & dr.any(of_segment != 0)
+        ray = hit.spawn_ray(hit.to_world(sample.wo))
+        hit, weight = scene.ray_intersect(ray, active), weight * of_segment
+        shines = dr.select(active, hit.emitter(scene, active).eval(hit, active), 0)
+        is_bright = dr.max(shines) > above
+        radiance += dr.select(is_bright, weight * shines, 0)
+        found = dr.select(is_bright, longest - left, found)
+        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, found, sampler
+
+    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
+    left, longest = dr.opaque(mi.UInt32, max_depth - 1), dr.opaque(mi.UInt32, max_depth)
+    path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), mi.UInt32(0), sampler
+    path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)
+    return path[4], path[6]
+
+
+def radiance_along(
+    render_scene: RenderScene,
+    ray: Any,
+    record: Any,
+    sampler: Any,
+    max_depth: int,
+    left_out: tuple[Any, Any] | None = None,
+) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
     What the first hit shines itself is left out, but not what shines from all around where nothing is hit.
     A path has at most `max_depth` segments. It is split at the first hit, where `STRATA` x `STRATA` points
-    of each lamp and `BOUNCES` directions are followed, each as one path.
+    of each lamp and `BOUNCES` directions are followed, each as one path. Of `left_out`, whether for each ray
+    and the radiance above which, `mirrored_radiance` is left out too.
     """
-    mi, dr, tracer = render_scene.mi, load_drjit(), _Tracer(render_scene)
+    mi, dr = render_scene.mi, load_drjit()
+    hides, above = left_out or (mi.Bool(False), mi.Float(0))
+    tracer = _Tracer(render_scene, above)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
     is_hit = hit.is_valid()
     radiance = hit.emitter(render_scene.scene, ~is_hit).eval(hit, ~is_hit)
@@ -167,29 +208,41 @@ def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: An
     radiance += tracer.direct_light(hit, bsdf, sampler, STRATA, BOUNCES, is_hit)
     left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
     for bounce in range(BOUNCES):
-        ray, end, active, emitted, weight = tracer.next_segment(
-            hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit
+        ray, end, active, emitted, weight, still_hides = tracer.next_segment(
+            hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit, hides
         )
-        path = active, left, ray, end, emitted, mi.Spectrum(1), sampler
+        path = active, left, ray, end, emitted, mi.Spectrum(1), still_hides, sampler
         if max_depth > 2:
             # A loop also for short paths: it is as fast as unrolled segments.
             path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), tracer.lengthen)
-        *_, light, _, sampler = path
+        *_, light, _, _, sampler = path
         radiance += weight * light / BOUNCES
     return radiance
 
 
 class _Tracer:
-    """The parts of a path: light that comes straight from lamps, and the segment that goes on."""
+    """The parts of a path: light that comes straight from lamps, and the segment that goes on.
 
-    def __init__(self, render_scene: RenderScene) -> None:
+    A path that hides what it meets by mirrors alone finds nothing there that is brighter than `above`.
+    """
+
+    def __init__(self, render_scene: RenderScene, above: Any) -> None:
+        self.above = above
         self.mi, self.dr, self.scene = render_scene.mi, load_drjit(), render_scene.scene
         self.context = self.mi.BSDFContext()
         around = _surroundings(self.mi, self.scene)
         self.lamps, self.aims_around = _lamps(self.scene) + around, bool(around)
 
     def lengthen(
-        self, active: Any, left: Any, ray: Any, hit: Any, radiance: Any, throughput: Any, sampler: Any
+        self,
+        active: Any,
+        left: Any,
+        ray: Any,
+        hit: Any,
+        radiance: Any,
+        throughput: Any,
+        hides: Any,
+        sampler: Any,
     ) -> tuple[Any, ...]:
         """Paths with one more segment, unless Russian roulette (Arvo and Kirk 1990) ends them.
 
@@ -199,7 +252,9 @@ class _Tracer:
         """
         dr, bsdf = self.dr, hit.bsdf(ray)
         direct = throughput * self.direct_light(hit, bsdf, sampler, 1, 1, active)
-        ray, hit, active, emitted, weight = self.next_segment(hit, bsdf, sampler, 1, 1, 0, active)
+        ray, hit, active, emitted, weight, hides = self.next_segment(
+            hit, bsdf, sampler, 1, 1, 0, active, hides
+        )
         throughput = throughput * weight
         radiance = radiance + direct + throughput * emitted
         left = left - 1
@@ -209,7 +264,7 @@ class _Tracer:
         # Only faint paths draw a number, so that the others are those without roulette.
         active &= ~is_faint | (sampler.next_1d(is_faint) * ROULETTE_THROUGHPUT < largest)
         throughput = dr.select(is_faint, throughput * (ROULETTE_THROUGHPUT / largest), throughput)
-        return active, left, ray, hit, radiance, throughput, sampler
+        return active, left, ray, hit, radiance, throughput, hides, sampler
 
     def direct_light(self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, active: Any) -> Any:
         """Light straight from all lamps, from `side` x `side` points of each, that leaves `hit` backwards."""
@@ -226,12 +281,21 @@ class _Tracer:
         return radiance
 
     def next_segment(
-        self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, bounce: int, active: Any
-    ) -> tuple[Any, Any, Any, Any, Any]:
+        self,
+        hit: Any,
+        bsdf: Any,
+        sampler: Any,
+        side: int,
+        bounces: int,
+        bounce: int,
+        active: Any,
+        hides: Any,
+    ) -> tuple[Any, Any, Any, Any, Any, Any]:
         """The segment that leaves `hit` as number `bounce` of `bounces`, in a direction that `bsdf` chose.
 
         Its ray, its end, whether a path goes on from there, what shines there, weighted against aiming at it
-        (at `side` x `side` points of each lamp), and the share of the light along the ray that leaves `hit`.
+        (at `side` x `side` points of each lamp), the share of the light along the ray that leaves `hit`, and
+        whether the path hides what it meets next by mirrors alone.
         """
         mi, dr, place = self.mi, self.dr, self.mi.Interaction3f(hit)
         across = sampler.next_2d(active)
@@ -243,15 +307,21 @@ class _Tracer:
         lamp = arrival.emitter(self.scene, active)
         towards = mi.DirectionSample3f(self.scene, arrival, place)
         # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
-        could_be_aimed_at = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        is_mirrored = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        could_be_aimed_at, hides = ~is_mirrored, hides & is_mirrored
         if not self.aims_around:
             could_be_aimed_at &= arrival.is_valid()
         pdf_lamp = side**2 * lamp.pdf_direction(place, towards, active)
         mis_weight = dr.select(could_be_aimed_at, _power_heuristic(bounces * sample.pdf, pdf_lamp), 1)
-        emitted = dr.select(active, lamp.eval(arrival, active) * mis_weight, 0)
-        return ray, arrival, active & arrival.is_valid(), emitted, dr.select(active, weight, 0)
+        shines = lamp.eval(arrival, active)
+        emitted = dr.select(active & ~(hides & (dr.max(shines) > self.above)), shines * mis_weight, 0)
+        return ray, arrival, active & arrival.is_valid(), emitted, dr.select(active, weight, 0), hides
 
 
 def _power_heuristic(pdf: Any, other: Any) -> Any:
-    """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
-    return pdf * pdf / (pdf * pdf + other * other)
+    """Weight of a sample that two ways could have given: the power heuristic with exponent 2.
+
+    Of the ratio, since the square of a density has no room in single precision where a lamp is met edge-on.
+    """
+    ratio = other / pdf
+    return 1 / (1 + ratio * ratio)

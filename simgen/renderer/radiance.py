@@ -1,8 +1,6 @@
 """Dense radiance of one view: every pixel, by path tracing."""
 
 import math
-from collections.abc import Iterator
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -19,8 +17,6 @@ LEAST_STEP_PX = 8
 """Sides of windows are multiples of this at least: smaller steps would save no time that can be measured."""
 Window = tuple[slice, slice]
 """Rows and columns of a film."""
-SEED_STEP = 0x9E3779B9
-"""Between seeds of parts of one view: 2^32 over the golden ratio, whose multiples stay far apart."""
 PARTS = (*(4**power for power in range(15, 1, -1)), 8, 4, 2, 1)
 """Numbers of samples that are rendered at a time: powers of two, since others are added in an order that is
 left to chance, and such that the sampler has exactly so many cells (of 32 it makes 5 x 7, and 35 samples)."""
@@ -76,25 +72,33 @@ def render_view(
     """
     camera = as_rig(cameras).camera(k, l)
     sampler = {"type": "independent" if independent else "multijitter"}
-    seeds = ((seed + number * SEED_STEP) % 2**32 for number in count())
+    # Mitsuba takes 32 bits, so each part of the samples has a seed of its own.
+    rng = np.random.default_rng(seed)
     windows: list[Window] = []
     if background_samples is not None:
         windows, saved = windows_of_objects(render_scene, camera, samples_per_pixel, background_samples)
         if saved <= 0:
             windows, background_samples = [], None
-    image = _mean_of_paths(render_scene, camera, sampler, background_samples or samples_per_pixel, seeds)
+    image = _mean_of_paths(render_scene, camera, sampler, background_samples or samples_per_pixel, rng)
     for rows, cols in windows:
         part = camera.of_window(rows, cols)
-        image[rows, cols] = _mean_of_paths(render_scene, part, sampler, samples_per_pixel, seeds)
+        image[rows, cols] = _mean_of_paths(render_scene, part, sampler, samples_per_pixel, rng)
+    wrong = np.argwhere(~np.isfinite(image).all(axis=2))
+    if wrong.size:
+        row, col = wrong[0].tolist()
+        number = int(first_objects(render_scene, camera.position_mm, camera.towards(*wrong[:1].T))[0])
+        raise InputError(not_finite(render_scene, number, (k, l), (row, col), camera.grid))
     return image
 
 
 def _mean_of_paths(
-    render_scene: RenderScene, camera: Camera, sampler: dict[str, Any], samples: int, seeds: Iterator[int]
+    render_scene: RenderScene, camera: Camera, sampler: dict[str, Any], samples: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """The film of a camera, (H, W, C) float32; each part of its samples takes the next seed."""
+    """The film of a camera, (H, W, C) float32; each part of its samples has its own seed."""
     mi = render_scene.mi
     plugin = sensor_plugin(mi, camera, sampler, render_scene.frame)
+    if render_scene.medium is not None:
+        plugin["medium"] = render_scene.medium
     if render_scene.filters is not None:
         # A channel for each colour's sensitivity, instead of R, G, B.
         del plugin["film"]["pixel_format"]
@@ -105,12 +109,8 @@ def _mean_of_paths(
     total, rest = np.zeros(()), samples
     for part in PARTS:
         while rest >= part:
-            image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=part, seed=next(seeds)))
-            is_finite = np.isfinite(image).all(axis=2)
-            if not is_finite.all():
-                towards = camera.towards(*np.argwhere(~is_finite)[:1].T)
-                number = first_objects(render_scene, camera.position_mm, towards)[0]
-                raise InputError(not_finite(render_scene, int(number)))
+            seed = int(rng.integers(1 << 32))
+            image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=part, seed=seed))
             if part == samples:
                 return image
             total = total + part * image.astype(np.float64)

@@ -21,7 +21,7 @@ LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
 ASCII_AND_MORE = re.compile(r"latin-?1|iso-8859-\d+|windows-125\d", re.IGNORECASE)
 """Encodings that are read if all characters are ASCII, which are the same in UTF-8."""
 OF_RECIPES = ("sensor", "film", "sampler", "rfilter", "integrator")
-"""Elements that recipes have instead: of a sensor its place alone is used."""
+"""Elements that recipes have instead: of a sensor its place and its medium are used."""
 
 
 class MitsubaName(AssetName):

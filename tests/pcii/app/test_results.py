@@ -160,7 +160,8 @@ def test_xarray_opens_results_with_named_axes_and_units(tmp_path: Path) -> None:
     with writing(out, dataset) as folder:
         save_sections(folder, focus.sections)
         save_segmented(folder, focus)
-        save_depth(folder, DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7))))
+        save_depth(folder, DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7)), hot_pixels=3))
+    assert xarray.open_zarr(out / "depth.zarr", consolidated=False).attrs["hot_pixels"] == 3
     for path in out.glob("*.zarr"):
         arrays = xarray.open_zarr(path, consolidated=False)
         assert all({"units", "long_name"} <= set(array.attrs) for array in arrays.values())

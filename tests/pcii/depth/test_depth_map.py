@@ -111,7 +111,9 @@ def test_depths_that_look_alike_share_the_probability():
             surface = surface_posterior(evidence.nats, method.prior).transpose(2, 0, 1)
             nowhere = np.zeros(surface.shape[1:], np.float32)
             for posterior in (
-                DepthPosterior(planes, surface, nowhere, method.block_px, surface[:0], nowhere > 0),
+                DepthPosterior(
+                    planes, surface, nowhere, method.block_px, surface[:0], nowhere > 0, nowhere > 0
+                ),
                 method.posterior(counts, z_range_mm),
             ):
                 probabilities.append(np.median(posterior.most_probable()[1]))
@@ -173,6 +175,38 @@ def test_the_depth_of_a_slanted_card_is_monotone(turned):
     # Bands of 16 px span 1.8 px of total disparity, planes 1: half of each.
     np.testing.assert_allclose(found, true, atol=1.4)
     assert np.isfinite(z[:, 16:-16]).mean() > 0.9
+
+
+def test_what_is_beyond_the_ends_of_the_range_has_no_answer_and_belongs_to_no_mask() -> None:
+    grid = unit_grid(7, 7, 128, 160)
+    # Total disparities of 10 px at the left to 44 px; the range is 20 to 32 px.
+    counts, total_px = slanted_card(grid, near=44 / 6, far=10 / 6, seed=0), np.linspace(10, 44, 160)
+    z_range_mm = (6 / 32, 6 / 20)
+    is_answered = np.isfinite(estimate_depth(counts, z_range_mm).z_mm).mean(axis=0)
+    assert is_answered[(total_px > 22) & (total_px < 30)].mean() > 0.9
+    assert is_answered[(total_px < 18) | (total_px > 34)].mean() < 0.05
+    masks = segment(counts, z_range_mm, z_range_mm=z_range_mm).in_focus.any(axis=0).mean(axis=0)
+    assert masks[(total_px < 18) | (total_px > 34)].mean() < 0.05
+
+
+@pytest.mark.parametrize("total_px", [31.0, 33.0, 13.5])
+def test_a_wall_just_outside_the_range_has_no_answer(total_px: float) -> None:
+    # The range is 15 to 31.5 px: the network is to see how evidence falls off on either side of the wall.
+    grid = unit_grid(7, 7, 96, 96)
+    counts = slanted_card(grid, total_px / 6, total_px / 6, seed=1)
+    answered = np.isfinite(estimate_depth(counts, (6 / 31.5, 6 / 15)).z_mm).mean()
+    assert answered > 0.9 if total_px == 31 else answered < 0.02
+
+
+def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
+    grid, rng, side = unit_grid(5, 5, 128, 128), np.random.default_rng(3), 40
+    thing = patch_views(2 * blocky_texture(rng, side, side), 44, 44, 6, grid)[..., 0]
+    depth = estimate_depth(PhotonCounts.from_dense(rng.poisson(1 + thing), grid), (1 / 9, 1 / 3))
+    is_plain = np.ones(grid.shape_HW, bool)
+    is_plain[32:96, 32:96] = False
+    assert np.median(depth.confidence[44:84, 44:84]) > 0.7
+    # Where a region is answered with the certainty of the network it is .35.
+    assert depth.confidence[is_plain].mean() < 0.1
 
 
 def test_depths_stay_in_the_range(depth):
@@ -242,10 +276,10 @@ def test_depths_that_are_too_many_or_seen_by_one_camera_are_refused():
     counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
     with pytest.raises(InputError, match=r"z_range_mm: .* choose a farther near end"):
         estimate_depth(counts, (1e-6, 1.0))
-    # The disparity at z is 1 / z px, and films of 8 px have nothing in common from 8 px on.
-    estimate_depth(counts, (1 / 9, 1 / 7.9))
-    with pytest.raises(InputError, match=r"z_range_mm: up to 0.125 mm no two cameras see the same"):
-        estimate_depth(counts, (0.125 - 1e-12, 0.125))
+    # The disparity at z is 1 / z px, and films of 256 px have nothing in common from 256 px on.
+    estimate_depth(counts, (1 / 257, 1 / 255.9))
+    with pytest.raises(InputError, match=r"z_range_mm: up to 0.00390625 mm no two cameras see the same"):
+        estimate_depth(counts, (1 / 256 - 1e-12, 1 / 256))
     for z_mm, sentence in (([1e-3], "no two cameras"), ([1e-6, 1.0], "choose a farther near end")):
         with pytest.raises(InputError, match=f"z_mm: .*{sentence}"):
             segment(counts, z_mm=z_mm)

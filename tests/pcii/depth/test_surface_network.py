@@ -1,5 +1,7 @@
 """What the network of depth is given and gives, whatever its weights are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from twins import unit_grid
@@ -7,7 +9,7 @@ from twins import unit_grid
 from pcii.base.compiled_loops import threads, use_threads
 from pcii.depth import surface_network
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
-from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import depth_prior, near_requested, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
@@ -58,6 +60,29 @@ def test_a_requested_plane_is_three_times_as_probable_and_the_others_alike() -> 
     assert prior[[0, 20, 22, 59]] == pytest.approx([1, 3, 1 + 2 * np.exp(-0.5), 1], abs=1e-3)
     assert prior[41] == prior[42]
     np.testing.assert_array_equal(depth_prior(9, np.zeros(0)), np.ones(9))
+
+
+def test_depths_and_masks_are_weighted_by_the_request_and_masks_by_what_was_learned(monkeypatch) -> None:
+    monkeypatch.setattr(
+        surface_network, "TEMPERATURE", 1.0
+    )  # so that depths are those that masks are made of
+
+    def of(*planes: float) -> tuple[np.ndarray, np.ndarray]:
+        """Probabilities of planes, and the logits of masks solved from the equation of the theory."""
+        requested = np.array(planes)
+        probability, _, in_focus = run_network(random_inputs(Z=30), requested)
+        near = np.tensordot(near_requested(30, requested), probability, axes=1) + surface_network.MIN_NEAR
+        far = 1 - near.sum(axis=0) + (len(planes) + 1) * surface_network.MIN_NEAR
+        return probability, np.log(in_focus / near) - np.log((1 - in_focus.sum(axis=0)) / far)
+
+    (one, logits), (both, (lower, upper)) = of(3.4), of(3.0, 4.0)
+    for probability, planes in ((one, [3.4]), (both, [3.0, 4.0])):
+        expected = of()[0] * depth_prior(30, np.array(planes))[:, None, None]
+        expected *= probability.sum(axis=0) / expected.sum(axis=0)
+        np.testing.assert_allclose(probability, expected, rtol=1e-3, atol=1e-7)
+    # What was learned is of planes, whatever is requested.
+    np.testing.assert_allclose(logits[0], 0.6 * lower + 0.4 * upper, atol=0.02)
+    assert logits.std() > 0.05
 
 
 def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,15 +161,21 @@ def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() ->
     probability[:, 0, 0] = [0.0, 0.25, 0.5, 0.0]
     probability[:, 0, 1] = [0.4, 0.1, 0.0, 0.0]
     nothing = 1 - probability.sum(axis=0)
-    posterior = DepthPosterior(planes, probability, nothing, 2, probability[:0], nothing < 1)
+    posterior = DepthPosterior(planes, probability, nothing, 2, probability[:0], nothing < 1, nothing < 1)
     plane, confidence, total_px = posterior.most_probable()
     assert plane.tolist() in ([[1, 0]], [[2, 0]])
     np.testing.assert_allclose(confidence, [[0.75, 0.5]])
     np.testing.assert_allclose(total_px, [[(5 * 0.25 + 6 * 0.5) / 0.75, (4 * 0.4 + 5 * 0.1) / 0.5]])
+    z_range_mm = (2 / 7, 2 / 4)  # of what other depths show around, half of the probability is believed
+    alone, among = depth_map_of(posterior, z_range_mm), replace(posterior, is_supported=nothing > 1)
+    np.testing.assert_allclose(depth_map_of(among, z_range_mm).confidence, alone.confidence / 2)
+    assert alone.confidence.max() == pytest.approx(0.75)
 
 
 def test_a_posterior_that_does_not_cover_the_film_is_refused() -> None:
     planes = FocalPlanes.at_total_disparity(unit_grid(1, 3, 4, 5), [4.0, 5.0])
     nowhere = np.zeros((2, 2), np.float32)
     with pytest.raises(ValueError, match=r"probability: expected \(2, 2, 3\), got \(2, 2, 2\)"):
-        DepthPosterior(planes, nowhere[None].repeat(2, 0), nowhere, 2, nowhere[None][:0], nowhere > 0)
+        DepthPosterior(
+            planes, nowhere[None].repeat(2, 0), nowhere, 2, nowhere[None][:0], nowhere > 0, nowhere > 0
+        )

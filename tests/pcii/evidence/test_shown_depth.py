@@ -14,11 +14,17 @@ MODEL, BLOCK_PX, DISPARITIES_PX = TextureModel(), 2, (4.0, 4.5, 5.0, 5.5, 6.0)
 PATCH = np.s_[18:42, 26:50]  # blocks well inside the texture of `patch_of`
 
 
-def shown(counts: PhotonCounts) -> np.ndarray:
+def shown_and_supported(counts: PhotonCounts, plane: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Where a depth is shown, and where that of a plane, 5 px, is supported."""
     steps = max(counts.grid.rows, counts.grid.cols) - 1
     planes = FocalPlanes.at_total_disparity(counts.grid, steps * np.array(DISPARITIES_PX))
     nats = evidence_of_texture(counts, planes, BLOCK_PX, MODEL).nats
-    return ShownDepth()(counts, planes, nats, BLOCK_PX, MODEL)
+    depth = np.full(nats.shape[1:], plane)
+    return ShownDepth(support_planes=0)(counts, planes, slice(0, len(planes)), nats, depth, BLOCK_PX, MODEL)
+
+
+def shown(counts: PhotonCounts) -> np.ndarray:
+    return shown_and_supported(counts)[0]
 
 
 def patch_of(disparity_px: int, *, photons: float, shear_px: int = 0) -> PhotonCounts:
@@ -33,7 +39,15 @@ def patch_of(disparity_px: int, *, photons: float, shear_px: int = 0) -> PhotonC
 @pytest.mark.parametrize("shear_px", [0, 5, 8])
 @pytest.mark.parametrize("photons", [0.05, 100.0])
 def test_a_surface_in_the_range_shows_its_depth(photons: float, shear_px: int) -> None:
-    assert shown(patch_of(5, photons=photons, shear_px=shear_px))[PATCH].mean() > 0.95
+    counts = patch_of(5, photons=photons, shear_px=shear_px)
+    for part in shown_and_supported(counts):
+        assert part[PATCH].mean() > 0.95
+
+
+def test_a_depth_where_the_surface_is_out_of_focus_is_not_supported() -> None:
+    counts = patch_of(5, photons=1.0)
+    for plane, is_supported in ((2, True), (4, False)):  # that is 6 px of total disparity away
+        assert (shown_and_supported(counts, plane)[1][PATCH] == is_supported).mean() > 0.95
 
 
 def test_what_lies_outside_the_range_shows_no_depth_in_it() -> None:

@@ -18,7 +18,8 @@ def test_a_block_belongs_to_the_most_probable_plane_or_to_none(two_squares):
     is_detected = np.ones((h, w), bool)
     is_detected[0, 3] = False
     depths = np.full((2, h, w), 0.5, np.float32)
-    posterior = DepthPosterior(planes, depths, np.zeros((h, w), np.float32), 2, in_focus, is_detected)
+    no_surface = np.zeros((h, w), np.float32)
+    posterior = DepthPosterior(planes, depths, no_surface, 2, in_focus, is_detected, is_detected)
     masks = masks_of(posterior, sections).in_focus
     assert masks[:, 0, :8:2].tolist() == [[True, False, False, False], [False, True, False, False]]
     assert masks.sum() == 8

@@ -225,7 +225,7 @@ def test_a_lamp_that_the_probe_misses_is_in_the_forecast() -> None:
     lamp_px = 0.0003
     luminance = 64 * 64 * WALL_RADIANCE / lamp_px
     size_mm = np.sqrt(lamp_px) / PX_PER_MM
-    looked = probe(built(wall(shining(SHAPES["card"](size_mm), luminance))), GRID, "GRBG", seed=1)
+    looked = probe(Setup(built(wall(shining(SHAPES["card"](size_mm), luminance))), GRID, "GRBG", 3), seed=1)
     assert looked.mean == pytest.approx(2 * WALL_RADIANCE, rel=0.2)
     assert looked.variance == pytest.approx(lamp_px / 64**2 * luminance**2, rel=0.3)
 
@@ -260,5 +260,5 @@ def test_radiance_that_is_no_number_is_refused_with_the_object(monkeypatch: pyte
         return light * float("nan") if COMPILED else np.full_like(light, np.nan)
 
     monkeypatch.setattr(module, "_follow", broken)
-    with pytest.raises(InputError, match=r"^object 'wall': its radiance is not a finite number"):
+    with pytest.raises(InputError, match=r"^object 'wall': its radiance in row \d+, column \d+ of view \(\d"):
         explore(setup, Photons(budget=100))

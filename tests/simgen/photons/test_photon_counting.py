@@ -395,7 +395,7 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
     two_objects: RenderScene, scope: str, budget: float, pixels: int
 ) -> None:
     dim = recipe(grid=PROBED, photons={"budget": budget, "scope": scope})
-    seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", PROBE_SEED)
+    seen = probe(Setup(two_objects, dim.grid.camera_grid(), "GRBG", 3), PROBE_SEED)
     made = planned(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
     assert made.normaliser_error == pytest.approx(error)

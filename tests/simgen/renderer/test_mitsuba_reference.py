@@ -66,6 +66,7 @@ FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"
 <rgb name="albedo" value=".9,.8,.6"/>
 </medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
 <bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
+MATT = '<bsdf type="diffuse"><rgb name="reflectance" value="%g"/></bsdf>'
 OBJ = '<shape type="obj"><string name="filename" value="%s"/></shape>'
 SURFACE = '<shape type="sphere"><bsdf type="%s">%s</bsdf></shape>'
 PICTURE = '<texture type="%s" name="reflectance"/>'
@@ -147,6 +148,31 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
     row, column = int(0.71 * SIDE), int(0.27 * SIDE)
     seen = hit.instance[0] or hit.shape[0]
     assert truth.names[int(truth.object_id[row, column])] == seen.id()
+
+
+@pytest.mark.renders
+def test_a_lamp_whose_surface_is_rounded_into_its_own_sight_has_its_photons(folder: Path) -> None:
+    """Single precision turns faces so that a point sees others of its face edge-on: densities beyond 1e19."""
+    turned = '<rotate y="1" angle="180"/>'
+    place = (
+        '<transform name="to_world"><scale value="%g"/>'
+        + turned
+        + '<translate x="%g" y="%g" z="%g"/></transform>'
+    )
+    facing = '<sensor type="perspective" id="front"/>'
+    wall = f'<shape type="rectangle" id="wall">{place % (450, 0, 0, 620)}{MATT % 0.6}</shape>'
+    side_mm = 30.0
+    area_px = (side_mm / 500 * FOCAL_MM / GRID.pixel_mm) ** 2
+    radiance = 0.6 * SIDE**2 / area_px
+    shines = f'<emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter>'
+    lamp = f'<shape type="rectangle" id="lamp">{place % (side_mm / 2, -7, -3, 500)}{MATT % 0}{shines}</shape>'
+    light = '<emitter type="constant"><rgb name="radiance" value="1"/></emitter>'
+    scene = scene_of(folder, facing + wall + lamp + light, mitsuba={"file": "scene.xml", "unit_mm": 1.0})
+    counts, truth = simgen.draw_photons(scene, GRID, budget=4000, cfa=None, seed=1, max_depth=3)
+    assert truth.photons is not None
+    number = next(number for number, name in truth.names.items() if name == "lamp")
+    share = (truth.photons.object_id == number).sum() / counts.total
+    assert share == pytest.approx(SIDE**2 / (2 * SIDE**2 - area_px), abs=0.03)  # 4 of 0.008
 
 
 @pytest.mark.renders

@@ -1,0 +1,209 @@
+"""Bright light that few paths meet: what holds it, how much it is, and where to aim at it.
+
+Light of the radiance L that adds F to the sum of radiance over a film of P pixels fills F / L of them, so R
+paths from the cameras meet it R F / (L P) times on average, however it reaches them: straight, by mirrors,
+through glass, or scattered by a surface that few paths see it from. F is measured from the lamp's side, where
+nothing is too small to be met (`light_tracing`). What holds a share of the light that matters and is met too
+rarely to be sure of is aimed at, or forecast as noise of rendered views.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from simgen.base import random_streams as seeds
+from simgen.photons.candidates import (
+    CandidateSampler,
+    FilmPoints,
+    Setup,
+    is_on_film,
+    nothing,
+)
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.emission_sampler import EmissionSampler, film_px
+from simgen.renderer.light_tracing import Arrivals, LampTracer
+
+SEED = 0
+"""What is found decides on how photons are drawn, not where they fall: with one seed for all, datasets that
+differ in nothing but their seed are made alike."""
+LEAST_SHARE = 0.01
+"""Share of a film's light that is not to be missing: what rendered views may have of noise."""
+SURE_HITS = 20.0
+"""Light that so many paths meet on average is met; none of them does with a probability of 2e-9."""
+SURVEY_POINTS = 1 << 12
+"""Points of lamps at which their radiance is looked at first, to leave out lamps that are not bright."""
+FIRST_RAYS, MAX_RAYS = 1 << 15, 1 << 20
+"""Rays that are followed from lamps: at first, and at most until the light is known."""
+KNOWN_TO = 0.02
+"""Share of a film's light to which what matters is to be known, with a confidence of 95 %."""
+MIN_DISC_SHARE = 0.1
+"""Least radius of the disc in which light is caught, as a share of the median depth. Larger: less noise, but
+light at cameras that stand close together is told less well apart."""
+LIT_POINTS = 1 << 13
+"""Rays of each lamp that stands at a point, by which the places are known that it lights."""
+SAME_DEPTH = 1e-3
+"""Share by which depths of the same place may differ."""
+MIN_DISC_MM = 1.0
+"""The same where nothing is seen to have a depth."""
+STRAIGHT_POINTS = 1 << 13
+"""Points of what shines in view, by which its light and its share of the film are known."""
+
+
+class BrightLight(NamedTuple):
+    """Light of one `radiance`: `what` holds it, and what it adds to the sum of radiance over a film's pixels.
+
+    `arrivals` are where it was seen to come from, if mirrors or glass alone send it to the cameras: as many
+    `bounces` of them.
+    """
+
+    what: str
+    light: float
+    radiance: float
+    arrivals: Arrivals | None = None
+    bounces: int = 0
+
+    @classmethod
+    def of(cls, what: str, light: np.ndarray, radiance: np.ndarray) -> "BrightLight":
+        """All of these (N,) together, of the mean radiance of their light."""
+        total = float(light.sum())
+        return cls(what, total, float((light * radiance).sum()) / total)
+
+    @property
+    def image_px(self) -> float:
+        """How much of a film it fills."""
+        return self.light / self.radiance
+
+    @property
+    def log(self) -> dict[str, Any]:
+        """What the manifest says of it."""
+        light, image_px = (float(f"{value:.3g}") for value in (self.light, self.image_px))
+        return {"what": self.what, "light_of_a_film": light, "image_px": image_px}
+
+    def hits(self, paths: float, pixels: int) -> float:
+        """How many of `paths` from the cameras, spread over films of so many pixels, meet it on average."""
+        return paths * self.image_px / pixels
+
+
+def brightest_that_matters(film_light: float, paths: float, pixels: int) -> float:
+    """Radiance up to which `paths` surely meet what matters of films whose radiance sums to `film_light`."""
+    return LEAST_SHARE * film_light * paths / (SURE_HITS * pixels)
+
+
+def straight_light(setup: Setup) -> list[BrightLight]:
+    """What comes straight from surfaces that are drawn from: all that shines, unless a medium lies between.
+
+    A picture has a row for each octave of its brightness, so that a bright spot counts apart from the rest.
+    """
+    emission = EmissionSampler(setup)
+    if not emission.mass or setup.render_scene.why_rendered:
+        return []
+    rng = seeds.generator(SEED, stage="aimed pilot", part=2)
+    arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % setup.grid.view_count, rng)
+    light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
+    rows = _rows(arriving.surface[None], light, arriving.radiance)
+    names = [_name(setup, number) for number in emission.numbers.tolist()]
+    return [
+        BrightLight.of(names[arriving.surface[row[0]]], light[row], arriving.radiance[row]) for row in rows
+    ]
+
+
+def mirrored_light(
+    setup: Setup, film_light: float, paths: float, z_mm: np.ndarray, *, with_straight: bool
+) -> list[BrightLight]:
+    """What mirrors and glass send to the cameras first, of lamps so bright that `paths` may not meet it.
+
+    `film_light` is the sum of radiance over a film as it is known, `z_mm` (N,) depths that are seen. With
+    `with_straight` also what comes straight from lamps that `straight_light` does not know.
+    """
+    grid = setup.grid
+    depth_mm = float(np.median(z_mm[np.isfinite(z_mm)])) if np.isfinite(z_mm).any() else 0.0
+    reach_mm = float(np.linalg.norm(setup.rig.position_mm[..., :2], axis=-1).max())
+    disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm, MIN_DISC_MM)
+    tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, disc_mm)
+    known = set() if setup.render_scene.why_rendered else {one.number for one in setup.render_scene.shining}
+    is_known = np.array([number in known for number in tracer.objects], dtype=bool)
+    if not (tracer.has_mirrors or (with_straight and not is_known.all())):
+        return []
+    least_radiance = brightest_that_matters(film_light, paths, grid.height * grid.width)
+    survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % max(len(tracer.lamps), 1)
+    is_bright = tracer.radiance_of(survey, seeds.integer(SEED, stage="lamp rays")) > least_radiance
+    lamps = np.unique(survey[is_bright]) if len(tracer.lamps) else survey[:0]
+    if not lamps.size:
+        return []
+    parts, rays = list[tuple[int, Arrivals]](), 0
+    while True:
+        number, round_number = max(rays, FIRST_RAYS), len(parts) + 1
+        seed = seeds.integer(SEED, stage="lamp rays", round_number=round_number)
+        arrivals, brightest = tracer.follow(np.resize(lamps, number), seed, least_radiance)
+        is_own = (arrivals.bounces > 0) | (with_straight & ~is_known[arrivals.lamp])
+        parts.append((number, arrivals.take(is_own)))
+        rays += number
+        light = np.concatenate([part.light * (of * lamps.size / rays) for of, part in parts])
+        # Two standard errors, and of what no ray has met three rays, have a confidence of 95 %.
+        error = 2 * np.sqrt((light**2).sum()) + 3 * brightest * lamps.size * number / rays
+        does_not_matter = light.sum() + error < LEAST_SHARE * film_light
+        if does_not_matter or error < KNOWN_TO * (film_light + light.sum()) or rays >= MAX_RAYS:
+            break
+    arrivals = Arrivals(*map(np.concatenate, zip(*(part for _, part in parts), strict=True)))
+    arrivals, result = arrivals._replace(light=light), []
+    if light.sum() <= LEAST_SHARE * film_light:
+        return []
+    kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
+    for row in _rows(kinds, light, arrivals.radiance):
+        own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
+        name = _name(setup, tracer.objects[lamp])
+        if own.bounces.any():
+            clear = setup.render_scene.names.get(int(np.bincount(own.object_id).argmax()))
+            name += " through what is no object" if clear is None else f" through '{clear}'"
+        seen = BrightLight.of(name, own.light, own.radiance)
+        result.append(seen if is_scattered else seen._replace(arrivals=own, bounces=bounces))
+    return result
+
+
+def lit_light(
+    setup: Setup, sampler: CandidateSampler, film_light: float, paths: float
+) -> tuple[list[BrightLight], Samples]:
+    """What a lamp that stands at a point lights so brightly, as a spot lamp its dot, that `paths` may not
+    meet it; and paths that do."""
+    tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, 0.0)
+    least_radiance = brightest_that_matters(film_light, paths, setup.grid.height * setup.grid.width)
+    rows, seen = list[BrightLight](), [nothing(setup.channels).exceeding]
+    for places in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
+        view = np.arange(places.area_mm2.size) % setup.grid.view_count
+        k, l = np.divmod(view, setup.grid.cols)
+        away_mm = places.point_mm - setup.rig.position_mm[k, l]
+        row, col, z_mm = film_px(setup.rig, view, away_mm, np.zeros((2, 1)))
+        slope = np.maximum(-(places.normal * away_mm).sum(axis=1), 0)
+        scale_px = setup.grid.focal_mm / setup.grid.pixel_mm
+        image_px = np.nan_to_num(places.area_mm2 * scale_px**2 * slope / z_mm**3)
+        here = np.flatnonzero(is_on_film(setup.grid, row + 0.5, col + 0.5) & (image_px > 0))
+        if not here.size:
+            continue
+        points = FilmPoints(view[here], row[here] + 0.5, col[here] + 0.5)
+        traced = sampler.trace(points, here.size, seeds.integer(SEED, stage="lamp rays", part=1))
+        # What stands before a place has another depth.
+        radiance = np.where(
+            np.isclose(traced.z_mm, z_mm[here], rtol=SAME_DEPTH), traced.light.mean(axis=1), 0
+        )
+        bright = radiance > least_radiance
+        if bright.any():
+            light = (image_px[here] * radiance)[bright]
+            rows.append(BrightLight.of("a place that a lamp lights", light, radiance[bright]))
+            seen.append(traced.take(bright))
+    return rows, Samples.joined(seen)
+
+
+def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:
+    """Indices of what is of the same kinds (K, N) and of one octave of radiance (N,)."""
+    octave = np.floor(np.log2(np.maximum(radiance, np.finfo(float).tiny))).astype(np.int64)
+    _, row = np.unique(np.concatenate([kinds, octave[None]]), axis=1, return_inverse=True)
+    return (np.flatnonzero(row.ravel() == number) for number in range(row.max(initial=-1) + 1))
+
+
+def _name(setup: Setup, number: int) -> str:
+    """What an object, or 0 for a lamp of the scene and -1 for what is all around, is called in messages."""
+    name = setup.render_scene.names.get(number)
+    if name is None:
+        return "the surroundings" if number < 0 else "a lamp"
+    return f"'{name}'"

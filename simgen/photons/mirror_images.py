@@ -1,0 +1,240 @@
+"""Photons of lamps that are seen by mirrors and through glass, drawn where their images fall on the films.
+
+Where an image falls is known from the lamp's side (`bright_light`), and found exactly by paths through the
+film that follow mirrors alone. Around the paths that meet the lamp the film is divided into cells that are
+finer than the image. Candidates of these cells are kept with probability radiance / bound, as everywhere;
+paths through the film leave out, in these cells alone, what candidates of them can bring. So every path is
+drawn in one way, whatever the cells are, and an image of a thousandth of a pixel gets its photons as a large
+one does.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from simgen.base import random_streams as seeds
+from simgen.cameras.rig import Rig
+from simgen.photons.bright_light import SEED, BrightLight
+from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, Setup, nothing
+from simgen.photons.emission_sampler import EmissionSampler, film_px
+from simgen.photons.wavefront_sampler import WavefrontSampler
+from simgen.sensor.photon_table import PhotonTable, joined, no_photons
+
+NEIGHBOURS = 256
+"""Arrivals nearest to a camera, from which places of images on its film are interpolated."""
+REWEIGHTED = 4
+"""Rounds of the fit by which arrivals that do not belong to the main image lose their weight."""
+MIN_SPREAD_PX = 0.5
+"""Least standard deviation of the first paths around these places."""
+FIRST_HITS = 300.0
+"""First paths that are to meet the images in each view: many, as curved glass has faint ones beside the main
+one, within the ends of `FIRST_PATHS` for all views."""
+FIRST_PATHS = 1 << 14, 1 << 21
+MORE_PATHS = 1 << 17
+"""Paths around those that have met an image: what cells they meet is what is drawn from."""
+CELLS_ACROSS = 4.0
+"""Cells along an image. More: fewer candidates for each photon, but more paths to find all cells."""
+MAX_CELLS_PER_PX = 1 << 10
+"""Single precision tells places on a film apart by some eighth of this."""
+MAX_CELLS = 1 << 20
+LEAST_PEAK = 0.99
+"""Light is drawn apart if it is brighter than this share of the dimmest that arrives: what rounds off."""
+RAISED = 1.1
+"""Bounds are this many times the largest radiance that paths have found in a cell and around it."""
+
+
+class MirrorImages:
+    """Images of lamps in mirrors and glass, as candidates are drawn from them.
+
+    `bound` (M,) are those of the cells. `mass` is their sum in one view, in radiance px as of
+    `CandidateSampler`, of the view that has the most.
+    """
+
+    def __init__(self, sampler: WavefrontSampler, cells: ImageCells, bound: np.ndarray) -> None:
+        self.sampler, self.grid, self.cells, self.bound = sampler, sampler.setup.grid, cells, bound
+        self.running = np.concatenate([[0.0], np.cumsum(bound)]) / cells.per_px**2
+        of_view = self.grid.height * self.grid.width * cells.per_px**2
+        first = np.arange(self.grid.view_count + 1, dtype=np.uint64) * np.uint64(of_view)
+        self.of_view = self.running[np.searchsorted(cells.number, first)]
+        self.mass = float(np.diff(self.of_view).max())
+
+    def try_candidates(
+        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
+    ) -> Accepted:
+        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`.
+
+        `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
+        """
+        rng = np.random.default_rng(seed)
+        points, candidate, cell = self._draw(view, rng)
+        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
+        bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
+        here = is_of_group[group[candidate], bayer]
+        points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
+        radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
+        # Of what exceeds its bound there are more photons than one.
+        number = np.floor(radiance / self.bound[cell] + rng.random(cell.size)).astype(np.int64)
+        k, l = np.divmod(points.view, self.grid.cols)
+        i, j = points.row.astype(np.int64), points.col.astype(np.int64)
+        origin = {"object_id": object_id, "z_mm": z_mm}
+        photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
+        accepted = nothing(self.sampler.setup.channels)
+        return accepted._replace(photons=photons, candidate=candidate.repeat(number))
+
+    def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
+        """Light of a film, mean of all views, by the number of mirrors before it, of `number` candidates."""
+        view = np.arange(number) % self.grid.view_count
+        points, _, cell = self._draw(view, np.random.default_rng(seed))
+        radiance, bounces, _, _ = self.sampler.trace_mirrored(points, self.cells.above, seed)
+        light = radiance / self.bound[cell] * (self.mass / number)
+        return np.bincount(bounces, light, minlength=self.sampler.setup.max_depth + 1)
+
+    def _draw(self, view: np.ndarray, rng: np.random.Generator) -> tuple[FilmPoints, np.ndarray, np.ndarray]:
+        """Points of the films of `view` (N,), fewer than these: with the number of each and its cell."""
+        per_px = self.cells.per_px
+        # Views with less than the most have candidates that belong to no cell.
+        target = self.of_view[view] + rng.random(view.size) * self.mass
+        candidate = np.flatnonzero(target < self.of_view[view + 1])
+        cell = np.searchsorted(self.running, target[candidate], side="right") - 1
+        cell = np.clip(cell, 0, self.bound.size - 1)
+        line, col = np.divmod(self.cells.number[cell].astype(np.int64), self.grid.width * per_px)
+        down, right = rng.random((2, cell.size))
+        row = (line % (self.grid.height * per_px) + down) / per_px
+        return FilmPoints(view[candidate], row, (col + right) / per_px), candidate, cell
+
+
+class KnownPlaces:
+    """All that is drawn where it is known to be, as candidates are drawn from it: of each in its share of the
+    `mass`, the sum of theirs."""
+
+    def __init__(self, parts: Sequence[EmissionSampler | MirrorImages]) -> None:
+        self.parts = [part for part in parts if part.mass]
+        self.masses = np.array([part.mass for part in self.parts])
+        self.mass = float(self.masses.sum())
+
+    def try_candidates(
+        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
+    ) -> Accepted:
+        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`."""
+        which = np.zeros(view.size, dtype=np.int64)
+        if len(self.parts) > 1:
+            rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+            which = rng.choice(self.masses.size, view.size, p=self.masses / self.mass)
+        tables, candidates = [no_photons()], [np.zeros(0, dtype=np.int64)]
+        for number, part in enumerate(self.parts):
+            here = np.flatnonzero(which == number)
+            accepted = part.try_candidates(group[here], view[here], cells, seed)
+            tables.append(accepted.photons)
+            candidates.append(here[accepted.candidate])
+        return nothing(1)._replace(photons=joined(tables), candidate=np.concatenate(candidates))
+
+
+def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> MirrorImages | None:
+    """Images of these lights, of which all have arrivals; None if no path meets any of them."""
+    peaks = [light.arrivals.peak.min() for light in lights if light.arrivals is not None]
+    grid, above = sampler.setup.grid, LEAST_PEAK * float(min(peaks))
+    met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
+
+    def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
+        seed = seeds.integer(SEED, stage="lamp rays", part=part)
+        if not points.view.size:
+            return points, np.zeros(0)
+        brought, *_ = sampler.trace_mirrored(points, above, seed)
+        return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
+
+    for number, light in enumerate(lights):
+        rng = seeds.generator(SEED, stage="lamp rays", part=number)
+        first, brought = send(_first_points(sampler.setup, light, rng), 10 + 2 * number)
+        if first.view.size:
+            around = _evenly_by_pixel(first, MORE_PATHS, rng)
+            aside_px = rng.standard_normal((2, MORE_PATHS)) * np.sqrt(light.image_px)
+            row, col = first.row[around] + aside_px[0], first.col[around] + aside_px[1]
+            second, more = send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
+            met += [first, second]
+            radiance += [brought, more]
+    points, brought = FilmPoints(*map(np.concatenate, zip(*met, strict=True))), np.concatenate(radiance)
+    if not brought.size:
+        return None
+    finest = CELLS_ACROSS / np.sqrt(min(light.image_px for light in lights))
+    per_px = int(np.clip(2 ** np.ceil(np.log2(finest)), 1, MAX_CELLS_PER_PX))
+    cells, bound = _cells_around(sampler.setup, points, brought, per_px)
+    while cells.size > MAX_CELLS:
+        per_px //= 2
+        cells, bound = _cells_around(sampler.setup, points, brought, per_px)
+    return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
+
+
+def _evenly_by_pixel(points: FilmPoints, number: int, rng: np.random.Generator) -> np.ndarray:
+    """Indices (`number`,) of points, half of them drawn evenly and half so that each pixel has as many."""
+    pixel = np.stack([points.view, points.row.astype(np.int64), points.col.astype(np.int64)])
+    _, which, times = np.unique(pixel, axis=1, return_inverse=True, return_counts=True)
+    chance = 1 / times[which.ravel()]
+    half = rng.choice(chance.size, number // 2, p=chance / chance.sum())
+    return np.concatenate([half, rng.integers(0, chance.size, number - number // 2)])
+
+
+def _first_points(setup: Setup, light: BrightLight, rng: np.random.Generator) -> FilmPoints:
+    """Points of all films around the places at which this light is seen.
+
+    Arrivals pass the disc around the cameras beside these. With the place where they pass the image moves on
+    the film, so what the nearest ones show is continued to each camera along a plane through them.
+    """
+    from scipy.spatial import KDTree
+
+    arrivals, grid, views = light.arrivals, setup.grid, np.arange(setup.grid.view_count)
+    assert arrivals is not None
+    k, l = np.divmod(views, grid.cols)
+    at_mm, number = setup.rig.position_mm[k, l][:, :2], min(NEIGHBOURS, arrivals.light.size)
+    _, nearest = KDTree(arrivals.place_mm).query(at_mm, number)
+    nearest = nearest.reshape(-1, number)
+    away = np.concatenate([arrivals.slope, np.ones((arrivals.light.size, 1))], axis=1)
+    row, col, _ = film_px(setup.rig, views.repeat(number), away[nearest.ravel()], np.zeros((2, 1)))
+    seen_px = np.stack([row, col], axis=1).reshape(-1, number, 2)
+    aside_mm = arrivals.place_mm[nearest] - at_mm[:, None]
+    design = np.concatenate([np.ones((*aside_mm.shape[:2], 1)), aside_mm], axis=2)
+    weight, usual_px = np.ones((views.size, number, 1)), np.zeros((views.size, 1, 1))
+    fitted = np.zeros((views.size, 3, 2))
+    for _ in range(REWEIGHTED):  # of several images the commonest decides, as with Cauchy's weights
+        fitted = np.linalg.pinv(weight * design) @ (weight * seen_px)
+        off_px = np.linalg.norm(seen_px - design @ fitted, axis=2, keepdims=True)
+        usual_px = np.maximum(np.median(off_px, axis=1, keepdims=True), MIN_SPREAD_PX)
+        weight = 1 / np.sqrt(1 + (off_px / usual_px) ** 2)
+    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(setup.rig, fitted)
+    paths = (FIRST_HITS * 2 * np.pi * spread_px**2 / light.image_px).sum()
+    moved_px = (seen_px - aside_mm @ fitted[:, 1:]).reshape(-1, 2) + 0.5
+    places = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
+    if not places.view.size:
+        return places
+    which = _evenly_by_pixel(places, int(np.clip(paths, *FIRST_PATHS)), rng)
+    aside_px = rng.standard_normal((2, which.size)) * spread_px[places.view[which]]
+    row, col = places.row[which] + aside_px[0], places.col[which] + aside_px[1]
+    return FilmPoints(places.view[which], row, col).on_film(grid)
+
+
+def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:
+    """Radius (V,) of the blur of an image that moves by `fitted` (V, 3, 2) px per mm; 0 of pinholes."""
+    if rig.lens is None:
+        return np.zeros(len(fitted))
+    scale_px = rig.grid.focal_mm / rig.grid.pixel_mm
+    per_mm = np.abs(fitted[:, 1:] + np.eye(2)[::-1] * scale_px / rig.lens.focus_mm).sum(axis=1).max(axis=1)
+    return rig.lens.aperture_mm / 2 * per_mm
+
+
+def _cells_around(
+    setup: Setup, points: FilmPoints, radiance: np.ndarray, per_px: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (M,) uint64, sorted, of the cells that points (N,) lie in and of those beside them, and the
+    largest radiance (M,) of points in each and beside it."""
+    height, width = setup.grid.height * per_px, setup.grid.width * per_px
+    row, col = ((part * per_px).astype(np.int64) for part in (points.row, points.col))
+    numbers, values = list[np.ndarray](), list[np.ndarray]()
+    for down, right in np.ndindex(3, 3):
+        i, j = row + down - 1, col + right - 1
+        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+        number = (points.view.astype(np.int64) * height + i) * width + j
+        numbers.append(number[inside])
+        values.append(radiance[inside])
+    cells, index = np.unique(np.concatenate(numbers), return_inverse=True)
+    largest = np.zeros(cells.size)
+    np.maximum.at(largest, index, np.concatenate(values))
+    return cells.astype(np.uint64), largest
