@@ -89,7 +89,7 @@ def depth_posterior(
     It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
     value everywhere: where no photon is, that of scenes on average. Of the depths `z_mm` (Z,), if any are
     given, it says what is in focus there, as the method "posterior" of `segment` does. Depths within 20 px of
-    total disparity around these and 3 px beyond the range are part of it, so that what is outside is not
+    total disparity around these and 7 px beyond the range are part of it, so that what is outside is not
     taken for something at the ends; depth maps and masks have no answer there. Raises `InputError` as
     `estimate_depth`.
     """

@@ -205,7 +205,7 @@ def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
     is_plain = np.ones(grid.shape_HW, bool)
     is_plain[32:96, 32:96] = False
     assert np.median(depth.confidence[44:84, 44:84]) > 0.7
-    # It is .35 with the certainty of the network.
+    # Where a region is answered with the certainty of the network it is .35.
     assert depth.confidence[is_plain].mean() < 0.1
 
 
