@@ -142,7 +142,7 @@ def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
     with pytest.raises(InputError, match=r"^grid: a depth map without masks"):
         score([], depth, truth())
     with pytest.raises(InputError, match=r"^truth: its maps are \(24, 32\), the estimates \(1, 1\)"):
-        score(None, DepthMap(*np.ones((2, 1, 1))), truth(), grid=GRID)
+        score(None, DepthMap(np.ones((1, 1)), np.ones((1, 1))), truth(), grid=GRID)
 
 
 def test_without_truth_everything_unknown_is_none() -> None:
