@@ -150,11 +150,11 @@ def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
     Beside what `is_plain_name` says, it has no colon but that of `depth:`, and no bracket. It differs from
     those of known methods by more than case, or else, if it `may_be_known`, is one of them.
     """
-    own = name.removeprefix(_PREFIX)
-    if not is_plain_name(own) or not own or _NOT_IN_NAMES & {*own}:
+    short_name = name.removeprefix(_PREFIX)
+    if not is_plain_name(short_name) or not short_name or _NOT_IN_NAMES & {*short_name}:
         raise InputError(
             f"{label}: expected a name of letters (of one alphabet in each word), digits, single blanks and "
-            f"ASCII punctuation other than colons and brackets, in Unicode's form NFKC, got {own!a}"
+            f"ASCII punctuation other than colons and brackets, in Unicode's form NFKC, got {short_name!a}"
         )
     known = known_methods()
     if may_be_known and name in known:

@@ -17,8 +17,6 @@ RATIO, EXCESS = 2.0, 5.0
 """A hot pixel has more than twice the photons of its brightest neighbour plus 5, in most views. By Poisson
 noise that happens in uniform light to less than one in 10^9 pixels of two views, and more rarely in more
 views."""
-
-
 STILL_PX = 1.0
 """A point that moves by less than this between the centre and any view may be in one pixel of half of the
 views."""

@@ -13,24 +13,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import (
-    CandidateSampler,
-    FilmPoints,
-    Setup,
-    is_on_film,
-    nothing,
-)
+from simgen.photons.candidates import CandidateSampler, FilmPoints, Setup, is_on_film, nothing
 from simgen.photons.disparity_layers import Samples
-from simgen.photons.emission_sampler import EmissionSampler, film_px
+from simgen.photons.emission_sampler import EmissionSampler, film_px, image_px_per_mm2
 from simgen.renderer.light_tracing import Arrivals, LampTracer
 
 SEED = 0
 """What is found decides on how photons are drawn, not where they fall: with one seed for all, datasets that
 differ in nothing but their seed are made alike."""
 LEAST_SHARE = 0.01
-"""Share of a film's light that is not to be missing: what rendered views may have of noise."""
+"""Smallest share of a film's light that bright light is looked for: the noise that rendered views may have.
+If it is larger, more light may be missing; if it is smaller, more is searched and refused."""
 SURE_HITS = 20.0
-"""Light that so many paths meet on average is met; none of them does with a probability of 2e-9."""
+"""Light that this many paths meet on average is taken as met: that none of them meets it has a probability of
+2e-9. If it is smaller, light may be missed; if it is larger, more is aimed at or refused."""
 SURVEY_POINTS = 1 << 12
 """Points of lamps at which their radiance is looked at first, to leave out lamps that are not bright."""
 FIRST_RAYS, MAX_RAYS = 1 << 15, 1 << 20
@@ -38,14 +34,14 @@ FIRST_RAYS, MAX_RAYS = 1 << 15, 1 << 20
 KNOWN_TO = 0.02
 """Share of a film's light to which what matters is to be known, with a confidence of 95 %."""
 MIN_DISC_SHARE = 0.1
-"""Least radius of the disc in which light is caught, as a share of the median depth. Larger: less noise, but
-light at cameras that stand close together is told less well apart."""
+"""Smallest radius of the disc in which light is caught, as a share of the median depth. If it is larger, more
+rays are caught, but images at cameras that stand close together are separated less well."""
+MIN_DISC_MM = 1.0
+"""Smallest radius of the disc if no surface has a depth."""
 LIT_POINTS = 1 << 13
 """Rays of each lamp that stands at a point, by which the places are known that it lights."""
 SAME_DEPTH = 1e-3
 """Share by which depths of the same place may differ."""
-MIN_DISC_MM = 1.0
-"""The same where nothing is seen to have a depth."""
 STRAIGHT_POINTS = 1 << 13
 """Points of what shines in view, by which its light and its share of the film are known."""
 
@@ -81,7 +77,7 @@ class BrightLight(NamedTuple):
         return {"what": self.what, "light_of_a_film": light, "image_px": image_px}
 
     def hits(self, paths: float, pixels: int) -> float:
-        """How many of `paths` from the cameras, spread over films of so many pixels, meet it on average."""
+        """Mean number of `paths` from the cameras, spread over films of `pixels`, that meet it."""
         return paths * self.image_px / pixels
 
 
@@ -109,14 +105,14 @@ def straight_light(setup: Setup) -> list[BrightLight]:
 
 
 def mirrored_light(
-    setup: Setup, film_light: float, paths: float, z_mm: np.ndarray, *, with_straight: bool
+    setup: Setup, film_light: float, paths: float, *, with_straight: bool
 ) -> list[BrightLight]:
     """What mirrors and glass send to the cameras first, of lamps so bright that `paths` may not meet it.
 
-    `film_light` is the sum of radiance over a film as it is known, `z_mm` (N,) depths that are seen. With
-    `with_straight` also what comes straight from lamps that `straight_light` does not know.
+    `film_light` is the sum of radiance over a film as it is known. With `with_straight` also what comes
+    straight from lamps that `straight_light` does not know.
     """
-    grid = setup.grid
+    grid, z_mm = setup.grid, setup.coarse_z_mm
     depth_mm = float(np.median(z_mm[np.isfinite(z_mm)])) if np.isfinite(z_mm).any() else 0.0
     reach_mm = float(np.linalg.norm(setup.rig.position_mm[..., :2], axis=-1).max())
     disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm, MIN_DISC_MM)
@@ -131,26 +127,12 @@ def mirrored_light(
     lamps = np.unique(survey[is_bright]) if len(tracer.lamps) else survey[:0]
     if not lamps.size:
         return []
-    parts, rays = list[tuple[int, Arrivals]](), 0
-    while True:
-        number, round_number = max(rays, FIRST_RAYS), len(parts) + 1
-        seed = seeds.integer(SEED, stage="lamp rays", round_number=round_number)
-        arrivals, brightest = tracer.follow(np.resize(lamps, number), seed, least_radiance)
-        is_own = (arrivals.bounces > 0) | (with_straight & ~is_known[arrivals.lamp])
-        parts.append((number, arrivals.take(is_own)))
-        rays += number
-        light = np.concatenate([part.light * (of * lamps.size / rays) for of, part in parts])
-        # Two standard errors, and of what no ray has met three rays, have a confidence of 95 %.
-        error = 2 * np.sqrt((light**2).sum()) + 3 * brightest * lamps.size * number / rays
-        does_not_matter = light.sum() + error < LEAST_SHARE * film_light
-        if does_not_matter or error < KNOWN_TO * (film_light + light.sum()) or rays >= MAX_RAYS:
-            break
-    arrivals = Arrivals(*map(np.concatenate, zip(*(part for _, part in parts), strict=True)))
-    arrivals, result = arrivals._replace(light=light), []
-    if light.sum() <= LEAST_SHARE * film_light:
+    is_searched = ~is_known & with_straight
+    arrivals, result = _arrivals(tracer, lamps, is_searched, film_light, least_radiance), []
+    if arrivals.light.sum() <= LEAST_SHARE * film_light:
         return []
     kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
-    for row in _rows(kinds, light, arrivals.radiance):
+    for row in _rows(kinds, arrivals.light, arrivals.radiance):
         own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
         name = _name(setup, tracer.objects[lamp])
         if own.bounces.any():
@@ -161,11 +143,38 @@ def mirrored_light(
     return result
 
 
+def _arrivals(
+    tracer: LampTracer,
+    lamps: np.ndarray,
+    is_searched: np.ndarray,
+    film_light: float,
+    least_radiance: float,
+) -> Arrivals:
+    """Light of the numbers `lamps` that mirrors and glass send to the cameras, or that comes straight from
+    lamps of which `is_searched` (all lamps,) says so: followed until it is known, or too little to matter."""
+    parts, rays = list[tuple[int, Arrivals]](), 0
+    while True:
+        number, round_number = max(rays, FIRST_RAYS), len(parts) + 1
+        seed = seeds.integer(SEED, stage="lamp rays", round_number=round_number)
+        arrivals, brightest = tracer.follow(np.resize(lamps, number), seed, least_radiance)
+        parts.append((number, arrivals.take((arrivals.bounces > 0) | is_searched[arrivals.lamp])))
+        rays += number
+        light = np.concatenate([part.light * (of * lamps.size / rays) for of, part in parts])
+        # Two standard errors, and three times the brightest ray for what none has met, are an upper limit
+        # with a confidence of 95 %.
+        error = 2 * np.sqrt((light**2).sum()) + 3 * brightest * lamps.size * number / rays
+        does_not_matter = light.sum() + error < LEAST_SHARE * film_light
+        if does_not_matter or error < KNOWN_TO * (film_light + light.sum()) or rays >= MAX_RAYS:
+            break
+    columns = zip(*(part for _, part in parts), strict=True)
+    return Arrivals(*map(np.concatenate, columns))._replace(light=light)
+
+
 def lit_light(
     setup: Setup, sampler: CandidateSampler, film_light: float, paths: float
 ) -> tuple[list[BrightLight], Samples]:
-    """What a lamp that stands at a point lights so brightly, as a spot lamp its dot, that `paths` may not
-    meet it; and paths that do."""
+    """Places that a lamp at a point lights, as a spot lamp its dot, so bright that `paths` may not meet them;
+    and paths through these places."""
     tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, 0.0)
     least_radiance = brightest_that_matters(film_light, paths, setup.grid.height * setup.grid.width)
     rows, seen = list[BrightLight](), [nothing(setup.channels).exceeding]
@@ -174,15 +183,13 @@ def lit_light(
         k, l = np.divmod(view, setup.grid.cols)
         away_mm = places.point_mm - setup.rig.position_mm[k, l]
         row, col, z_mm = film_px(setup.rig, view, away_mm, np.zeros((2, 1)))
-        slope = np.maximum(-(places.normal * away_mm).sum(axis=1), 0)
-        scale_px = setup.grid.focal_mm / setup.grid.pixel_mm
-        image_px = np.nan_to_num(places.area_mm2 * scale_px**2 * slope / z_mm**3)
+        image_px = places.area_mm2 * image_px_per_mm2(setup.rig, places.normal, away_mm, z_mm)
         here = np.flatnonzero(is_on_film(setup.grid, row + 0.5, col + 0.5) & (image_px > 0))
         if not here.size:
             continue
         points = FilmPoints(view[here], row[here] + 0.5, col[here] + 0.5)
         traced = sampler.trace(points, here.size, seeds.integer(SEED, stage="lamp rays", part=1))
-        # What stands before a place has another depth.
+        # Where the depth is another one, something stands before the place.
         radiance = np.where(
             np.isclose(traced.z_mm, z_mm[here], rtol=SAME_DEPTH), traced.light.mean(axis=1), 0
         )

@@ -15,11 +15,12 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.types.bayer import channel_count, colour_cells
 from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import Cameras, Rig, as_rig
+from simgen.cameras.rig import Cameras, Rig, as_rig, corners, with_larger_pixels
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
 from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.sensor.photon_table import PhotonTable, no_photons
+from simgen.truth.first_hits import first_hits_of_view
 
 
 class ImageCells(NamedTuple):
@@ -33,6 +34,10 @@ class ImageCells(NamedTuple):
     per_px: int
     number: np.ndarray
     above: float
+
+
+COARSE_PX = 64
+"""Longer side of films on which a scene is looked at first."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,18 @@ class Setup:
     def grid(self) -> CameraGrid:
         """The cameras as they ought to be."""
         return self.rig.grid
+
+    @property
+    def coarse_grid(self) -> CameraGrid:
+        """The same cameras with the same field of view on few pixels."""
+        return with_larger_pixels(self.grid, max(self.grid.shape_HW) / COARSE_PX, least_px=2)
+
+    @cached_property
+    def coarse_z_mm(self) -> np.ndarray:
+        """Depths (N,) in mm that the corner cameras see on few pixels; inf where nothing is hit."""
+        coarse = self.coarse_grid
+        hits = [first_hits_of_view(self.render_scene, coarse, k, l) for k, l in corners(coarse)]
+        return np.concatenate([of_view.z_mm.ravel() for of_view in hits])
 
     @property
     def channels(self) -> int:

@@ -21,16 +21,14 @@ from pcii.base.errors import InputError
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import Rig, corners, with_larger_pixels
+from simgen.cameras.rig import Rig
 from simgen.photons.bright_light import LEAST_SHARE, BrightLight, lit_light, mirrored_light, straight_light
 from simgen.photons.candidates import Setup
 from simgen.photons.exploration import Exploration, explore, sampler_of_films
 from simgen.photons.scopes import Scopes
 from simgen.photons.thinning import MAX_SINGLE_PHOTONS
-from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import MOST_PATHS, Photons
-from simgen.truth.first_hits import first_hits_of_view
 
 MAX_NOISE_SHARE = 0.01
 MAX_NORMALISER_ERROR = 0.003
@@ -43,8 +41,6 @@ UNBOUNDED = "rare light paths, as by mirrors, are too bright for single photons"
 PROBE_SEED = 0
 """The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
 nothing else are made alike: all with the origins of photons or all without."""
-PROBE_PX = 64
-"""Longer side of the film that the probe renders, twice."""
 PROBE_SAMPLES = 64
 DEPTH_STEPS = 64
 """Depths are rounded to equal steps of disparity, this many up to the nearest."""
@@ -106,7 +102,7 @@ class Plan:
 class Probe(NamedTuple):
     """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view.
 
-    `bright_light` is what of both the probe's own paths have likely not met.
+    `bright_light` is all bright light that is known, which both count in.
     """
 
     mean: float
@@ -167,7 +163,7 @@ def probe(setup: Setup, seed: int, found: Sequence[BrightLight] = ()) -> Probe:
     the pixels, and n L^2 to the variance.
     """
     grid = setup.grid
-    small, pixels = replace(_coarse(grid), rows=1, cols=1), grid.height * grid.width
+    small, pixels = replace(setup.coarse_grid, rows=1, cols=1), grid.height * grid.width
 
     def mosaic(part: int) -> np.ndarray:
         view_seed = seeds.integer(seed, stage="plan probe", part=part)
@@ -181,9 +177,7 @@ def probe(setup: Setup, seed: int, found: Sequence[BrightLight] = ()) -> Probe:
     mean = float((first + second).mean() / 2)
     film_light, paths = mean * pixels, 2 * PROBE_SAMPLES * small.height * small.width
     known = straight_light(setup) + lit_light(setup, sampler_of_films(setup), film_light, paths)[0]
-    known += mirrored_light(
-        setup, film_light, paths, _depths_mm(setup.render_scene, grid), with_straight=True
-    )
+    known += mirrored_light(setup, film_light, paths, with_straight=True)
     bright = max(known, list(found), key=_noise)
     missed = _missed(bright, paths, pixels)
     # Of light in a single pixel two halves tell the variance badly, even if both have met it.
@@ -192,7 +186,7 @@ def probe(setup: Setup, seed: int, found: Sequence[BrightLight] = ()) -> Probe:
 
 
 def _missed(rows: Sequence[BrightLight], paths: float, pixels: int) -> list[BrightLight]:
-    """Of bright light the part that so many paths are likely not to have met."""
+    """The part of each row that this many paths have not met, on average."""
     return [row._replace(light=row.light * math.exp(-row.hits(paths, pixels))) for row in rows]
 
 
@@ -210,7 +204,7 @@ def _choose_cheaper(
     found: Sequence[BrightLight] = (),
 ) -> Plan:
     """The cheaper way, or with a reason `why_rendered` the dense one; see `probe` for what was `found`."""
-    render_scene, grid = setup.render_scene, scopes.grid
+    grid = scopes.grid
     pixels = grid.height * grid.width
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
@@ -224,7 +218,7 @@ def _choose_cheaper(
 
     budget, gain = scopes.photons_per_view, scopes.photons_per_radiance
     if budget is not None and not why_rendered and are_few(budget) and is_cheaper(budget, min_samples):
-        return Plan(True, min_samples, budget, depths_mm=_first_hit_depths_mm(render_scene, grid))
+        return Plan(True, min_samples, budget, depths_mm=_few_depths_mm(setup.coarse_z_mm))
     probed = probe(setup, PROBE_SEED, found)
     # The virtual centre tells how many photons an exposure has, and what a unit of radiance has of a budget.
     if gain is None:
@@ -253,7 +247,7 @@ def _choose_cheaper(
         )
     noise = probed.photon_noise(gain, samples)
     error = 0.0 if scopes.pixels is None else probed.light_error(samples * scopes.pixels)
-    depths_mm = _first_hit_depths_mm(render_scene, grid) if thins else ()
+    depths_mm = _few_depths_mm(setup.coarse_z_mm) if thins else ()
     bright_light = tuple(
         row for row in probed.bright_light if row.light >= LEAST_SHARE * probed.mean * pixels
     )
@@ -273,22 +267,10 @@ def _why_noisy(probed: Probe, pixels: int) -> str:
     )
 
 
-def _first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
-    """Up to `DEPTH_STEPS` depths in mm that the corner cameras see in a coarse look; inf for nothing."""
-    z_mm = _depths_mm(render_scene, grid)
+def _few_depths_mm(z_mm: np.ndarray) -> tuple[float, ...]:
+    """Depths (N,) in mm rounded to `DEPTH_STEPS` at most; inf where there is nothing."""
     nearest = float(z_mm.min())
     if not nearest < math.inf:
         return (math.inf,)
     steps = np.unique(np.rint(DEPTH_STEPS * nearest / z_mm.astype(np.float64)))
     return tuple((DEPTH_STEPS * nearest / steps[steps > 0]).tolist())
-
-
-def _depths_mm(render_scene: RenderScene, grid: CameraGrid) -> np.ndarray:
-    """Depths (N,) in mm that the corner cameras see in a coarse look; inf for nothing."""
-    hits = [first_hits_of_view(render_scene, _coarse(grid), k, l) for k, l in corners(grid)]
-    return np.concatenate([of_view.z_mm.ravel() for of_view in hits])
-
-
-def _coarse(grid: CameraGrid) -> CameraGrid:
-    """The same cameras with the same field of view on few pixels."""
-    return with_larger_pixels(grid, max(grid.height, grid.width) / PROBE_PX, least_px=2)

@@ -145,10 +145,9 @@ class EmissionSampler:
             camera_mm = camera_mm + np.einsum("nab,bn->na", rig.rotation[k, l][..., :2], lens_point)
         away_mm = point_mm - camera_mm
         row_px, col_px, z_mm = film_px(rig, view, away_mm, lens_point)
-        scale_px = self.setup.grid.focal_mm / self.setup.grid.pixel_mm
-        sent = scale_px**2 * stretch * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3
+        sent = stretch * image_px_per_mm2(rig, normal, away_mm, z_mm)
         places = surface, point_mm, camera_mm, texcoord, row_px, col_px
-        return ShiningPoints(*places, np.nan_to_num(sent), self.pieces.bound[piece])
+        return ShiningPoints(*places, sent, self.pieces.bound[piece])
 
     def _radiance(self, points: ShiningPoints) -> np.ndarray:
         """Radiance (N, C) of points of surfaces, in the sensor's colours."""
@@ -174,6 +173,16 @@ def film_px(
         x, y = np.stack([x, y]) + lens_point * z_mm / rig.lens.focus_mm
     scale_px, axis_px = rig.grid.focal_mm / rig.grid.pixel_mm, rig.axis_px[k, l]
     return y / z_mm * scale_px + axis_px[:, 1], x / z_mm * scale_px + axis_px[:, 0], z_mm
+
+
+def image_px_per_mm2(rig: Rig, normal: np.ndarray, away_mm: np.ndarray, z_mm: np.ndarray) -> np.ndarray:
+    """Area (N,) of the image, in px^2, of each mm^2 of a surface of this unit `normal` (N, 3).
+
+    It is `away_mm` (N, 3) from the camera, at the planar depth `z_mm` (N,); 0 if it faces away, or if the
+    depth is NaN.
+    """
+    scale_px = rig.grid.focal_mm / rig.grid.pixel_mm
+    return np.nan_to_num(scale_px**2 * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3)
 
 
 def _surfaces_as_sensed(setup: Setup) -> Iterator[ShiningSurface]:

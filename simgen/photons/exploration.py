@@ -85,7 +85,9 @@ KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
 MIN_KEPT_SHARE = 1e-4
 MIN_FOUND_SHARE = 0.5
-"""Images in so many mirrors count as found if paths of the cameras find this share of what lamps send."""
+"""Least share of the light that lamps send by a number of mirrors that paths of the cameras have to find, or
+else these images are taken as missing. If it is larger, more scenes are rendered or refused; if it is
+smaller, the second of two equal images may be missing."""
 MAX_HIDDEN_SHARE = LEAST_SHARE / 4
 """Share of a film's light that may be in images that were not found: curved glass gathers them, so that one
 camera gets several times the mean of the disc."""
@@ -174,7 +176,7 @@ def _send_pilot(
     followed = int(FOLLOWED_SHARE * rays)
     film_light = float(mean.mean()) * setup.grid.height * setup.grid.width + direct
     known_paths = first.k.size + followed, int(photons / KEPT_SHARE_GUESS)
-    found, lit = _meet_bright_light(sampler, first, known_paths, film_light, emission)
+    found, lit = _meet_bright_light(sampler, known_paths, film_light, emission)
     found = replace(found, ambient=ambient, paths=paths)
     if found.image_cells is not None:  # without the light of these
         setup = replace(setup, image_cells=found.image_cells)
@@ -203,7 +205,6 @@ def _send_pilot(
 
 def _meet_bright_light(
     sampler: CandidateSampler,
-    first: Samples,
     known_paths: tuple[int, int],
     film_light: float,
     emission: EmissionSampler,
@@ -211,20 +212,19 @@ def _meet_bright_light(
     """What is known of bright light that few paths meet, without a majorant yet; and paths to what is lit
     brightly.
 
-    `first` are paths that are spread evenly, `known_paths` the numbers of those of the pilot and of a
-    rehearsal, which look for all light that surfaces scatter, `film_light` is the sum of radiance over a
-    film. Images of lamps are drawn apart, where a compiled backend runs. What is not found there as it is
-    sent, and matters, is `unmet`.
+    `known_paths` are the numbers of paths of the pilot and of a rehearsal, `film_light` is the sum of
+    radiance over a film. Images of lamps are drawn apart, where a compiled backend runs. Light that matters
+    and of which paths of the cameras find less than lamps send is `unmet`.
     """
     setup, paths = sampler.setup, known_paths[0]
     lit, traced = lit_light(setup, sampler, film_light, paths)
-    mirrored = mirrored_light(setup, film_light, paths, first.z_mm, with_straight=False)
+    mirrored = mirrored_light(setup, film_light, paths, with_straight=False)
     film_light += sum(light.light for light in lit + mirrored)
     pixels, images = setup.grid.height * setup.grid.width, None
-    is_rare = {True: paths, False: sum(known_paths)}  # by whether mirrors alone send it
-    rare = [row for row in mirrored if row.hits(is_rare[row.arrivals is not None], pixels) < SURE_HITS]
-    seen = [row for row in rare if row.arrivals is not None]
-    unmet = [row for row in rare if row.arrivals is None]
+    seen = [row for row in mirrored if row.arrivals is not None and row.hits(paths, pixels) < SURE_HITS]
+    # What surfaces scatter a rehearsal finds as well.
+    scattered, all_paths = [row for row in mirrored if row.arrivals is None], sum(known_paths)
+    unmet = [row for row in scattered if row.hits(all_paths, pixels) < SURE_HITS]
     if seen and isinstance(sampler, WavefrontSampler):
         images = find_images(sampler, seen)
     known = KnownPlaces([emission] if images is None else [emission, images])

@@ -18,7 +18,7 @@ from simgen.base.strict_models import shorten, suggestion
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
 from simgen.renderer.emission import ShiningSurface, sample_light
 from simgen.renderer.mitsuba_shapes import WorldFrame, across_faces
-from simgen.spec.mitsuba_file import MitsubaFile, MitsubaXml
+from simgen.spec.mitsuba_file import OF_RECIPES, MitsubaFile, MitsubaXml
 from simgen.spec.scene import check_unscored, names_of_objects
 from simgen.spectral.filters import Filters
 from simgen.spectral.spectra import WAVELENGTH_NM, integral
@@ -29,8 +29,6 @@ UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """Y up and Z towards the viewer, as models stand, to Y down and Z away from the cameras."""
 BRIGHTNESS = re.compile(r"(?:radiance|irradiance|intensity)\.value|(?:sun_|sky_)?scale")
 """Parameters that say how bright a light is; pictures that shine, and lights by temperature, have none."""
-OF_RECIPES = ("Sensor", "Film", "Sampler", "ReconstructionFilter", "Integrator")
-"""What of a file is not built: recipes say how a scene is seen."""
 REQUIRED = {"bitmap": "filename", "volume": "volume", "blendbsdf": "weight"}
 """What plugins use without a look at whether the file has it: a crash would end this process."""
 MIN_CUTOFF_DEG = 0.2
@@ -71,9 +69,8 @@ class Reference:
         return total
 
     def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> tuple[Any, Any]:
-        """Mitsuba's scene of all that the file has, its lights `gain` times as bright, and of `own` by id.
-
-        And the medium that the cameras stand in, None for air.
+        """Mitsuba's scene of all that the file has, its lights `gain` times as bright, and of `own` by
+        id; and the medium that the cameras stand in, None for air.
 
         Raises `InputError` with what Mitsuba says of a plugin, a parameter or a file.
         """
@@ -142,8 +139,8 @@ def _parse(mi: Any, path: Path, sensor: str | None = None) -> tuple[Any, Any]:
     """Mitsuba's settings and tree of a file, whose own files are named by their whole paths.
 
     What recipes have instead is not built: it is cut off the tree but for one `sensor`, whose medium is of
-    interest; the nodes have all sensors still. Raises
-    `InputError` for plugins and materials that Mitsuba does not ship, and for what would end this process.
+    interest; the nodes have all sensors still. Raises `InputError` for plugins and materials that Mitsuba
+    does not ship, and for what would end this process.
     """
     parser, resolver = mi.parser, mi.FileResolver()
     config = parser.ParserConfig(mi.variant())
@@ -164,9 +161,9 @@ def _parse(mi: Any, path: Path, sensor: str | None = None) -> tuple[Any, Any]:
         raise InputError(f"{path}: expected a <scene>, not a single plugin")
     for node in state.nodes:
         for key, child in _children(mi, state, node).items():
-            if _kind(child) in OF_RECIPES and child.props.id() != sensor:
+            if _kind(child) in OF_RECIPES.values() and child.props.id() != sensor:
                 del node.props[key]
-        if _kind(node) in (*OF_RECIPES, "Scene") and node.props.id() != sensor:
+        if _kind(node) in (*OF_RECIPES.values(), "Scene") and node.props.id() != sensor:
             continue
         values = _properties(node)
         if fault := _fault(node.props.plugin_name(), values, Path(mi.__file__).parent):

@@ -20,8 +20,15 @@ LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
 """Limits of all files together that make up a scene; Mitsuba's own parser has none."""
 ASCII_AND_MORE = re.compile(r"latin-?1|iso-8859-\d+|windows-125\d", re.IGNORECASE)
 """Encodings that are read if all characters are ASCII, which are the same in UTF-8."""
-OF_RECIPES = ("sensor", "film", "sampler", "rfilter", "integrator")
-"""Elements that recipes have instead: of a sensor its place and its medium are used."""
+OF_RECIPES = {
+    "sensor": "Sensor",
+    "film": "Film",
+    "sampler": "Sampler",
+    "rfilter": "ReconstructionFilter",
+    "integrator": "Integrator",
+}
+"""Elements that recipes have instead, and the names of their kinds in Mitsuba: of a sensor its place and its
+medium are used."""
 
 
 class MitsubaName(AssetName):

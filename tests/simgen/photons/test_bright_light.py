@@ -196,7 +196,7 @@ def test_a_lamp_in_a_scene_with_a_medium_is_in_the_forecast(tmp_path: Path, shap
     """Also a turned ball, of which Mitsuba mixes up places and normals."""
     scene = reference(tmp_path, FOG + SENSOR.format("") + WALL + ASIDE + SHINING.format(shape))
     setup = Setup(built(scene, tmp_path, 4), GRID, None, 4)
-    (row,) = mirrored_light(setup, 0.6 * PIXELS, 1 << 15, np.array([620.0]), with_straight=True)
+    (row,) = mirrored_light(setup, 0.6 * PIXELS, 1 << 15, with_straight=True)
     image_px = np.pi * (0.1 / 500 * FOCAL_PX) ** 2
     assert row.light == pytest.approx(3e5 * image_px, rel=0.15)
     if shape == "disk":
