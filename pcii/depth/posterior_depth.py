@@ -1,8 +1,8 @@
 """Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
 
 Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
-largest value. So a connected region that may be a surface has an answer if a depth is shown in a part of it
-(`pcii.evidence.shown_depth`).
+largest value. So a connected region that may be a surface, at any plane, has an answer if a depth is shown in
+a part of it (`pcii.evidence.shown_depth`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -123,8 +123,8 @@ class PosteriorDepth:
         nowhere = np.zeros(nothing[0].shape, bool)
         posterior = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
         plane, _, total_px = posterior.most_probable()
-        is_possible = _is_between(total_px, answered_px)
-        is_possible &= self._has_photons(network.photons, plane, block_px)
+        is_inside = _is_between(total_px, answered_px)
+        is_possible = self._has_photons(network.photons, plane, block_px)
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
             is_possible &= posterior.no_surface <= self.max_empty
         total_px = on_pixels(total_px, block_px, data.grid.shape_HW)
@@ -134,7 +134,8 @@ class PosteriorDepth:
             on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
             for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
         )
-        return replace(posterior, is_detected=self._detected(is_possible, shown), is_supported=supported)
+        is_detected = is_inside & self._detected(is_possible, shown & is_inside)
+        return replace(posterior, is_detected=is_detected, is_supported=supported)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.

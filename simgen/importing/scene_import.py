@@ -125,7 +125,10 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
         for name in names:
             (new / name).parent.mkdir(parents=True, exist_ok=True)
             (new / name).write_bytes((path.parent / name).read_bytes())
-    unused = f"{shorten(', '.join(xml.unused))}: recipes have them; of a sensor place and medium are used"
+    of_sensors = "of a sensor place and medium are used"
+    if reference.place_at_mm is not None:
+        of_sensors = "of a sensor nothing is used, not even its medium, since the scene is placed"
+    unused = f"{shorten(', '.join(xml.unused))}: recipes have them; {of_sensors}"
     return ImportedScene(out, (unused,) if xml.unused else (), names)
 
 

@@ -326,6 +326,9 @@ def test_an_import_copies_what_the_file_names(folder: Path) -> None:
     assert imported.left_out[0].startswith(
         "sensor perspective (fov = 35.0), film hdrfilm (width = 48, height"
     )
+    assert imported.left_out[0].endswith("of a sensor place and medium are used")
+    placed = simgen.import_scene(folder / "scene.xml", folder / "placed", place_at_mm=(0.0, 0.0, 600.0))
+    assert placed.left_out[0].endswith("nothing is used, not even its medium, since the scene is placed")
     scene = simgen.load_scene(folder / "copy")
     assert scene.mitsuba is not None
     assert (scene.mitsuba.unit_mm, scene.mitsuba.fit_mm) == (1.0, 200.0)
