@@ -37,6 +37,10 @@ BEYOND_PX = 7.0
 """Depths are compared so far beyond the ends of a range, so that a surface that is there is most probable
 there, and has no answer. If it is smaller, more of what is outside is answered at the ends; if it is larger,
 more planes are compared for nothing."""
+OUTSIDE_WEIGHT = 0.3
+"""Prior probability of a plane outside the range, or farther than `FOCUS_BLOCKS` from all requested planes
+where there is no range, relative to one inside: the range says where surfaces are expected. If it is larger,
+plain walls near an end have no answer; if it is smaller, more of what is outside is answered at the ends."""
 FOCUS_BLOCKS = 2.0
 """Without a range masks are of surfaces so far beyond the requested planes in total disparity at most, in
 coarse blocks: a blur half-extent of a block. If it is smaller, parts of bulky things are lost; if it is
@@ -107,13 +111,14 @@ class PosteriorDepth:
         coarse_px, block_px = self._blocks_px(planes)
         focus_px = 0.0 if z_range_mm else FOCUS_BLOCKS * coarse_px
         answered_px, replaced = _ends_px(data.grid, z_range_mm, z_mm, 0.0, focus_px), 0
+        inside = _within(planes, answered_px)
         if isinstance(data, PhotonCounts):
-            data, replaced = without_hot_pixels(data, planes.take(_within(planes, answered_px)))
+            data, replaced = without_hot_pixels(data, planes.take(inside))
         else:
             data = in_memory(data)
-        network = coarse = self._film_outputs(data, planes, block_px, z_mm)
+        network = coarse = self._film_outputs(data, planes, inside, block_px, z_mm)
         if coarse_px > block_px:
-            coarse = self._film_outputs(data, planes, coarse_px, z_mm)
+            coarse = self._film_outputs(data, planes, inside, coarse_px, z_mm)
             for mean, other in zip(network.maps, coarse.maps, strict=True):
                 for own, part in zip(mean, other, strict=True):
                     own += _between_blocks(part, own.shape)
@@ -153,9 +158,10 @@ class PosteriorDepth:
         return max(coarse_px, fine_px), fine_px
 
     def _film_outputs(
-        self, data: PhotonCounts | Views, planes: FocalPlanes, block_px: int, z_mm: np.ndarray
+        self, data: PhotonCounts | Views, planes: FocalPlanes, inside: slice, block_px: int, z_mm: np.ndarray
     ) -> FilmOutputs:
-        """What the network says of the planes, seeing the film in blocks of one size."""
+        """What the network says of the planes, seeing the film in blocks of one size; surfaces are expected
+        at those `inside`."""
         grid, step_px = data.grid, block_px / PLANES_PER_BLOCK
         own_planes = planes
         if step_px != self.step_px:
@@ -175,7 +181,9 @@ class PosteriorDepth:
             inputs = self.network_inputs(evidence, own_planes, block_px, requested_planes, part)
             outputs = run_network(inputs, requested_planes)
             h, w = nothing[0][part].shape
-            probability[:, *part] = _at_planes(outputs.probability[:, :h, :w], len(planes))
+            prior = np.full(len(planes), OUTSIDE_WEIGHT, np.float32)
+            prior[inside] = 1
+            probability[:, *part] = _at_planes(outputs.probability[:, :h, :w], len(planes), prior)
             nothing[:, *part] = outputs.no_surface[:h, :w]
             in_focus[:, *part] = outputs.in_focus[:, :h, :w]
         nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
@@ -292,19 +300,20 @@ def _in_four(evidence: TextureEvidence, shape_HW: tuple[int, int]) -> TextureEvi
     return TextureEvidence(nats, sums, samples, on_pixels(evidence.photons, 2, cells) / np.float32(4))
 
 
-def _at_planes(probability: np.ndarray, count: int) -> np.ndarray:
-    """Probabilities of `count` planes (count, h, w) from those of others (Z, h, w) between the same ends.
+def _at_planes(probability: np.ndarray, count: int, prior: np.ndarray) -> np.ndarray:
+    """Probabilities of `count` planes (count, h, w) from those of others (Z, h, w) between the same ends,
+    times the `prior` (count,) of the planes.
 
     Planes are evenly apart. That of a plane between two of fewer planes is given to both, as it is near; of
     more planes it is interpolated. The sum stays as it is.
     """
     Z = len(probability)
-    if count == Z:
-        return probability
-    fewer, more = sorted((count, Z))
-    places = np.linspace(0, fewer - 1, more)
-    nearness = np.stack([np.interp(places, np.arange(fewer), row) for row in np.eye(fewer)])
-    weights = (nearness if count < Z else nearness.T).astype(np.float32)
+    weights = np.diag(prior)
+    if count != Z:
+        fewer, more = sorted((count, Z))
+        places = np.linspace(0, fewer - 1, more)
+        nearness = np.stack([np.interp(places, np.arange(fewer), row) for row in np.eye(fewer)])
+        weights = prior[:, None] * (nearness if count < Z else nearness.T).astype(np.float32)
     resampled = np.tensordot(weights, probability, axes=1)
     resampled *= probability.sum(axis=0) / np.maximum(resampled.sum(axis=0), np.finfo(np.float32).tiny)
     return resampled

@@ -4,6 +4,7 @@ What is read of it here is where its axes are (see `WorldFrame`), the names of i
 """
 
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -249,6 +250,13 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> tuple[WorldFra
     node = cameras[next(iter(cameras)) if file.camera is None else file.camera]
     transform = node.props.get("to_world", None)
     pose = np.eye(4) if transform is None else np.array(transform.matrix, dtype=np.float64)
+    if np.linalg.det(pose[:3, :3]) < 0:
+        warnings.warn(
+            f"{path}: the sensor {node.props.id()!r} mirrors its picture left to right, for Mitsuba; cameras "
+            "here stand where it does and mirror nothing",
+            UserWarning,
+            stacklevel=2,
+        )
     forward = pose[:3, 2] / np.linalg.norm(pose[:3, 2])
     left = np.cross(pose[:3, 1], forward)
     left /= np.linalg.norm(left)

@@ -333,3 +333,15 @@ def test_an_import_copies_what_the_file_names(folder: Path) -> None:
     assert scene.mitsuba is not None
     assert (scene.mitsuba.unit_mm, scene.mitsuba.fit_mm) == (1.0, 200.0)
     assert scene.mitsuba.unscored == ("floor", "back")
+
+
+@pytest.mark.renders
+def test_a_sensor_that_mirrors_its_picture_is_named(folder: Path) -> None:
+    mirroring = CAMERA.replace("<lookat", '<scale x="-1"/><lookat')
+    (folder / "scene.xml").write_text(f'<scene version="3.0.0">{mirroring}{ROOM}</scene>')
+    with pytest.warns(UserWarning, match="the sensor 'front' mirrors its picture left to right"):
+        mirrored = reference_to(backend.load(), MitsubaFile(file="scene.xml"), folder)
+    (folder / "scene.xml").write_text(f'<scene version="3.0.0">{CAMERA}{ROOM}</scene>')
+    straight = reference_to(backend.load(), MitsubaFile(file="scene.xml"), folder)
+    points_mm = np.eye(3)
+    np.testing.assert_allclose(mirrored.frame.points(points_mm), straight.frame.points(points_mm), atol=1e-5)
