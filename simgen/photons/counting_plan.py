@@ -258,7 +258,8 @@ def _choose_cheaper(
 def _why_noisy(probed: Probe, pixels: int) -> str:
     """A clause on the bright light that makes most of the noise, if any does."""
     worst = max(probed.bright_light, key=lambda row: _noise([row]), default=None)
-    if worst is None or _noise([worst]) < probed.variance * pixels / 2:
+    # Where the probe has met a small lamp a few times its variance is too large by several times.
+    if worst is None or _noise([worst]) < probed.variance * pixels / 10:
         return ""
     share = worst.light / (probed.mean * pixels)
     return (
