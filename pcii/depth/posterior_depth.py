@@ -308,13 +308,14 @@ def _at_planes(probability: np.ndarray, count: int, prior: np.ndarray) -> np.nda
     more planes it is interpolated. The sum stays as it is.
     """
     Z = len(probability)
-    weights = np.diag(prior)
-    if count != Z:
+    if count == Z:
+        resampled = probability * prior[:, None, None]
+    else:
         fewer, more = sorted((count, Z))
         places = np.linspace(0, fewer - 1, more)
         nearness = np.stack([np.interp(places, np.arange(fewer), row) for row in np.eye(fewer)])
         weights = prior[:, None] * (nearness if count < Z else nearness.T).astype(np.float32)
-    resampled = np.tensordot(weights, probability, axes=1)
+        resampled = np.tensordot(weights, probability, axes=1)
     resampled *= probability.sum(axis=0) / np.maximum(resampled.sum(axis=0), np.finfo(np.float32).tiny)
     return resampled
 
