@@ -37,10 +37,11 @@ BEYOND_PX = 7.0
 """Depths are compared so far beyond the ends of a range, so that a surface that is there is most probable
 there, and has no answer. If it is smaller, more of what is outside is answered at the ends; if it is larger,
 more planes are compared for nothing."""
-OUTSIDE_WEIGHT = 0.3
+OUTSIDE_WEIGHT = 0.5
 """Prior probability of a plane outside the range, or farther than `FOCUS_BLOCKS` from all requested planes
 where there is no range, relative to one inside: the range says where surfaces are expected. If it is larger,
-plain walls near an end have no answer; if it is smaller, more of what is outside is answered at the ends."""
+plain walls near an end have no answer; if it is smaller, more of what is outside, and plain light around a
+thing, is answered."""
 FOCUS_BLOCKS = 2.0
 """Without a range masks are of surfaces so far beyond the requested planes in total disparity at most, in
 coarse blocks: a blur half-extent of a block. If it is smaller, parts of bulky things are lost; if it is

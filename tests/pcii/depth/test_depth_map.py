@@ -189,20 +189,22 @@ def test_what_is_beyond_the_ends_of_the_range_has_no_answer_and_belongs_to_no_ma
     assert masks[(total_px < 18) | (total_px > 34)].mean() < 0.05
 
 
-@pytest.mark.parametrize(
-    ("total_px", "share_of_light", "is_inside"),
-    [(31.0, 1, True), (33.0, 1, False), (13.5, 1, False), (15.5, 0.1, True)],
-)
-def test_a_wall_just_outside_the_range_has_no_answer(
-    total_px: float, share_of_light: float, is_inside: bool
-) -> None:
-    # The range is 15 to 31.5 px: the network is to see how evidence falls off on either side of the wall. In
-    # little light the range decides: planes beyond that were as probable would take .89 of the last wall.
+@pytest.mark.parametrize("total_px", [31.0, 33.0, 13.5])
+def test_a_wall_just_outside_the_range_has_no_answer(total_px: float) -> None:
+    # The range is 15 to 31.5 px: the network is to see how evidence falls off on either side of the wall.
     grid = unit_grid(7, 7, 96, 96)
     counts = slanted_card(grid, total_px / 6, total_px / 6, seed=1)
-    counts = counts.subsample(int(share_of_light * counts.total), np.random.default_rng(0))
     answered = np.isfinite(estimate_depth(counts, (6 / 31.5, 6 / 15)).z_mm).mean()
-    assert answered > 0.9 if is_inside else answered < 0.02
+    assert answered > 0.9 if total_px == 31 else answered < 0.02
+
+
+def test_in_little_light_the_range_decides_on_a_wall_near_its_end() -> None:
+    grid = unit_grid(7, 7, 96, 96)
+    counts = slanted_card(grid, 15.5 / 6, 15.5 / 6, seed=1)
+    counts = counts.subsample(counts.total // 10, np.random.default_rng(0))
+    answered = np.isfinite(estimate_depth(counts, (6 / 31.5, 6 / 15)).z_mm).mean()
+    # Where planes beyond the end are as probable as others it is .11.
+    assert answered > 0.5
 
 
 def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
@@ -212,8 +214,8 @@ def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
     is_plain = np.ones(grid.shape_HW, bool)
     is_plain[32:96, 32:96] = False
     assert np.median(depth.confidence[44:84, 44:84]) > 0.7
-    # Where a region is answered with the certainty of the network it is .27.
-    assert depth.confidence[is_plain].mean() < 0.2
+    # Where a region is answered with the certainty of the network it is .35.
+    assert depth.confidence[is_plain].mean() < 0.1
 
 
 def test_depths_stay_in_the_range(depth):
