@@ -462,8 +462,10 @@ def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
 ) -> None:
     monkeypatch.setattr("simgen.photons.exploration.MAX_REHEARSALS", 0)  # which would mend them
     scene = lit([WALL, ball("grey", 0.0, 600.0, (0.5, 0.5, 0.5))])
-    held = above_bound(scene)
-    assert held < 5e-4
+    # Of ten explorations .0001 to .0015 of the paths exceeded their bounds, and .0037 to .0048 with holes.
+    # One is made here, and machines round its paths differently.
+    most = 2.5e-3
+    assert above_bound(scene) < most
 
     def with_holes(*arguments: Any) -> Majorant:
         majorant = fit(*arguments)
@@ -472,7 +474,7 @@ def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
         return majorant
 
     monkeypatch.setattr("simgen.photons.exploration.fit", with_holes)
-    assert above_bound(scene) > 2 * held
+    assert above_bound(scene) > most
 
 
 def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has() -> None:
@@ -483,7 +485,7 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
         "luminance_cd_m2": 2e4,
     }
     lamp |= {"width_mm": 60, "height_mm": 60}
-    metal = {"finish": {"type": "metal", "name": "Al", "roughness": 0.02}}
+    metal = {"finish": {"type": "metal", "name": "Al", "roughness": 0.05}}
     grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
     for material, is_bounded in ((metal, False), ({"reflectance": (0.7, 0.3, 0.2)}, True)):
         thing = ball("ball", 40.0, 590.0, (1, 1, 1)) | {"material": material}
