@@ -448,12 +448,19 @@ WALL = {
 }
 
 
-def above_bound(scene: RenderScene) -> float:
-    """Share of paths that exceed their bound in a draw; 256 x 256 px."""
+def above_bound(scene: RenderScene, monkeypatch: pytest.MonkeyPatch) -> float:
+    """Share of paths that exceed their bound in a draw, the least of five explorations; 256 x 256 px.
+
+    Of one it is .0001 to .0015, by luck and by how the machine rounds.
+    """
     grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
     settings = Photons.model_validate({"budget": 20_000})
-    log = thin_photons(Setup(scene, grid, "GRBG", DEPTH), settings, seed=1)[1]
-    return log["paths_above_bound"] / log["kept"]
+    shares = list[float]()
+    for seed in range(5):
+        monkeypatch.setattr("simgen.photons.exploration.EXPLORATION_SEED", seed)
+        log = thin_photons(Setup(scene, grid, "GRBG", DEPTH), settings, seed=1)[1]
+        shares.append(log["paths_above_bound"] / log["kept"])
+    return min(shares)
 
 
 @pytest.mark.skipif(not COMPILED, reason="takes minutes, one candidate after the other")
@@ -462,10 +469,8 @@ def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
 ) -> None:
     monkeypatch.setattr("simgen.photons.exploration.MAX_REHEARSALS", 0)  # which would mend them
     scene = lit([WALL, ball("grey", 0.0, 600.0, (0.5, 0.5, 0.5))])
-    # Of ten explorations .0001 to .0015 of the paths exceeded their bounds, and .0037 to .0048 with holes.
-    # One is made here, and machines round its paths differently.
-    most = 2.5e-3
-    assert above_bound(scene) < most
+    held = above_bound(scene, monkeypatch)
+    assert held < 5e-4
 
     def with_holes(*arguments: Any) -> Majorant:
         majorant = fit(*arguments)
@@ -474,7 +479,7 @@ def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
         return majorant
 
     monkeypatch.setattr("simgen.photons.exploration.fit", with_holes)
-    assert above_bound(scene) > most
+    assert above_bound(scene, monkeypatch) > max(2 * held, 5e-4)
 
 
 def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has() -> None:
