@@ -9,6 +9,7 @@ from pcii.base.errors import InputError
 from pcii.depth.methods import estimate_depth
 from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.depth.sheets import SheetModel
 from pcii.depth.smooth_surface import surface_posterior
 from pcii.depth.surface_network import NetworkOutputs, run_network
 from pcii.evidence.texture_evidence import evidence_of_texture
@@ -319,13 +320,15 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
 
 
 def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes(two_squares) -> None:
-    counts, z_mm = two_squares.counts, np.array([0.2, 0.5])
+    counts, z_mm, network = two_squares.counts, np.array([0.2, 0.5]), SheetModel(sweeps=0)
     long_px = max(counts.grid.shape_HW)
     fine, coarse = (
-        PosteriorDepth(block_px=side, trained_blocks=long_px // side).posterior(counts, RANGE_MM, z_mm)
+        PosteriorDepth(sheets=network, block_px=side, trained_blocks=long_px // side).posterior(
+            counts, RANGE_MM, z_mm
+        )
         for side in (2, 4)
     )
-    both = PosteriorDepth(trained_blocks=long_px // 4).posterior(counts, RANGE_MM, z_mm)
+    both = PosteriorDepth(sheets=network, trained_blocks=long_px // 4).posterior(counts, RANGE_MM, z_mm)
     for name in ("probability", "no_surface", "in_focus"):
         one, other = (getattr(each, name) for each in (fine, coarse))
         down, right = (

@@ -1,0 +1,217 @@
+"""What the photons of all cameras say of the masks of sheets, by an objective that does not fall.
+
+Each camera sees the sheets from near to far: where camera k looks at x, a photon has the density
+
+    q_k(x) = sum_l m_l T_l prod_(j nearer than l) (1 - m_j) + T_L prod_j (1 - m_j),
+
+each mask m and texture T at the block that the ray meets, T_L the light without depth. Textures are what
+reaches the blocks, so that all follows from the masks. The objective is the log-likelihood
+
+    F(m) = sum_photons log q - integral q,
+
+in which each photon is predicted by the others alone: what explains its own noise gains nothing. Masks start
+as the network has them, and move towards what it and the photons say together, as far as F rises
+(docs/theory.md, "What hides what").
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pcii.base.compiled_loops import each_in_threads
+from pcii.depth.sheet_kernels import add_up, expect_photons, explain_photons, meet_sheets, reach_sheets
+from pcii.depth.sheet_textures import gaussian_weights, smooth_texture, textures
+from pcii.depth.sheets import SheetModel, Sheets
+from pcii.evidence.octave_kernels import gaussian_mean
+from pcii.imaging.blocks import evenly_chosen
+from pcii.types.geometry import parallax_per_total
+from pcii.types.photon_counts import PhotonCounts
+
+FILM_BLOCKS = 2
+"""Every so many blocks along either axis of a film it is computed what is seen there."""
+HALVINGS = 2
+"""Of a step that lowers the objective. After them masks stay as they are."""
+
+
+class Rays(NamedTuple):
+    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); `colour` (N,) int8."""
+
+    blocks: np.ndarray
+    order: np.ndarray
+    colour: np.ndarray
+
+
+class State(NamedTuple):
+    """`masks` (L, h, w), their `objective` in nats, and its `slope` (L, h, w): by how much more a block
+    explains if the sheet is there than if it is not, as all else stays."""
+
+    masks: np.ndarray
+    objective: float
+    slope: np.ndarray
+
+
+class ExplainedViews:
+    """The photons of all cameras, explained by sheets, whose masks are in `state`."""
+
+    def __init__(self, counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> None:
+        self.sheets, self.model = sheets, model
+        self.shape = sheets.total_px.shape[1:]
+        self.prior = sheets.masks(model.least)
+        colours = np.array([1.0]) if counts.cfa is None else np.array([0.25, 0.5, 0.25])
+        self.samples = (colours * block_px**2).astype(np.float32)
+        """Of each colour in a block of one view."""
+        self.photons = _met(sheets, *_photon_rays(counts, block_px, model.most_photons))
+        film, self.ray_views = _film_rays(counts, block_px, model.cameras)
+        self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
+        of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
+        seen = self.samples * self.ray_views * len(self.film.blocks)
+        self.mean = np.maximum(of_colours / seen, np.finfo(np.float32).tiny).astype(np.float32)
+        self.state = self._state(self.prior)
+
+    def objective(self) -> float:
+        """F of the masks as they are, in nats."""
+        return self.state.objective
+
+    def sweep(self) -> bool:
+        """Masks one step better; False where no step is found that does not lower F."""
+        masks, best = self.state.masks, self._best_masks()
+        step = np.float32(self.model.step)
+        for _ in range(HALVINGS + 1):
+            state = self._state((1 - step) * masks + step * best)
+            if state.objective >= self.state.objective:
+                self.state = state
+                return True
+            step /= 2
+        return False
+
+    def _best_masks(self) -> np.ndarray:
+        """The most probable masks (L, h, w) if all else stays as it is.
+
+        The logit of each is that of the network, and what the photons around say, as the mean of a window:
+        each block as if all of its window were like it, but no more than `most_nats`.
+        """
+        model = self.model
+        weights, nearest = gaussian_weights(model.window_blocks), gaussian_weights(1.0)
+        window = np.float32(2 * np.pi * model.window_blocks**2)
+
+        def of_sheet(sheet: int) -> np.ndarray:
+            nats = window * gaussian_mean(self.state.slope[sheet], nearest)
+            prior = self.prior[sheet]
+            odds = np.exp(gaussian_mean(nats.clip(-model.most_nats, model.most_nats), weights))
+            odds *= prior / (1 - prior)
+            return odds / (1 + odds)
+
+        masks = np.stack(each_in_threads(of_sheet, range(len(self.prior))))
+        return masks.clip(model.least, 1 - model.least)
+
+    def _state(self, masks: np.ndarray) -> State:
+        L, h, w = masks.shape
+        Q, photons, film = self.samples.size, self.photons, self.film
+        flat = masks.reshape(L, -1)
+        reach, seen = (np.empty(rays.blocks.shape, np.float32) for rays in (photons, film))
+        reach_sheets(photons.blocks, photons.order, flat, reach)
+        reach_sheets(film.blocks, film.order, flat, seen)
+        reached, exposure = np.zeros((L + 1, Q, h * w), np.float32), np.zeros((L + 1, 1, h * w), np.float32)
+        add_up(reached, photons.blocks, photons.colour, reach)
+        add_up(exposure, film.blocks, film.colour, seen)
+        exposure *= np.float32(self.ray_views)
+        T, own = self._textures(masks, reached.reshape(L + 1, Q, h, w), exposure.reshape(L + 1, h, w))
+        of_sheets = flat, T.reshape(Q, L + 1, -1), own.reshape(Q, L, -1)
+        gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
+        likelihood = sum(explain_photons(*photons, reach, of_sheets, gain))
+        samples = self.samples * np.float32(self.ray_views)
+        expected = sum(expect_photons(film.blocks, film.order, samples, seen, of_sheets, loss))
+        no_colour = np.zeros(len(gain), np.int8)
+        more, less = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
+        add_up(more, photons.blocks, no_colour, gain)
+        add_up(less, film.blocks, film.colour, loss)
+        slope = (more - less).reshape(masks.shape)
+        return State(masks, likelihood - expected, slope)
+
+    def _textures(
+        self, masks: np.ndarray, reached: np.ndarray, exposure: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Textures (Q, L + 1, h, w) of all sheets and the light without depth, and the share (Q, L, h, w) of
+        a photon in each, from what reaches their blocks."""
+        L, Q, common = len(masks), self.samples.size, (self.mean, self.samples, self.model)
+        T = np.empty((Q, L + 1, *masks.shape[1:]), np.float32)
+        own = np.empty((Q, L, *masks.shape[1:]), np.float32)
+
+        def of_sheet(sheet: int) -> None:
+            if sheet == L:
+                T[:, L] = smooth_texture(reached[L], exposure[L], *common)
+            else:
+                both = textures(reached[sheet], exposure[sheet], masks[sheet], *common)
+                T[:, sheet], own[:, sheet] = both
+
+        each_in_threads(of_sheet, range(L + 1))
+        return T, own
+
+
+def explain(
+    counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel
+) -> tuple[np.ndarray, np.ndarray]:
+    """Probabilities (L, h, w) that each sheet is what is seen, by the network alone and by the photons."""
+    views = ExplainedViews(counts, sheets, block_px, model)
+    for _ in range(model.sweeps):
+        if not views.sweep():
+            break
+    return sheets.seen(views.prior), sheets.seen(views.state.masks)
+
+
+def _met(sheets: Sheets, rays: tuple[np.ndarray, ...], colour: np.ndarray) -> Rays:
+    shape = rays[0].size, len(sheets.total_px) + 1
+    blocks, order = np.empty(shape, np.int32), np.empty(shape, np.int8)
+    meet_sheets(blocks, order, sheets.total_px, rays)
+    return Rays(blocks, order, colour)
+
+
+def _photon_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Rays of photons, of `most` at most, each somewhere in its pixel, and their colours (N,) int8."""
+    events, random = counts.events, np.random.default_rng(0)
+    n, total = np.asarray(events.n), int(events.n.sum())
+    if total > most:
+        n = random.binomial(n, most / total)
+    k, l, i, j, colour = (
+        np.repeat(part, n) for part in (events.k, events.l, events.i, events.j, counts.event_colours)
+    )
+    pixels = i + random.random(i.size), j + random.random(j.size)
+    return _rays(counts, (k, l), pixels, block_px), colour.astype(np.int8)
+
+
+def _film_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], float]:
+    """Rays of places evenly apart on the films of some cameras with photons, and how many views of a block
+    each stands for.
+
+    The places differ from camera to camera, so that no blocks are left out.
+    """
+    grid, side = counts.grid, FILM_BLOCKS * block_px
+    has_photons = (np.diff(counts.view_starts) > 0).reshape(grid.rows, grid.cols)
+    chosen = [
+        (k, l, (row + 2 * (col % 2)) % 4, (col + 2 * (row % 2)) % 4)
+        for row, k in enumerate(evenly_chosen(grid.rows, most))
+        for col, l in enumerate(evenly_chosen(grid.cols, most))
+        if has_photons[k, l]
+    ] or [(k, l, 1.5, 1.5) for k, l in np.argwhere(has_photons)[:1]]
+    rows, cols = np.arange(0, grid.height, side), np.arange(0, grid.width, side)
+    views, across = len(chosen), (len(rows), len(cols))
+    k, l, down, right = (np.array(part)[:, None, None] for part in zip(*chosen, strict=True))
+    i = rows[:, None] + (down + 0.5) * side / 4
+    j = cols + (right + 0.5) * side / 4
+    places = (np.broadcast_to(part, (views, *across)).ravel() for part in (k, l, i, j))
+    k, l, i, j = places
+    return _rays(counts, (k, l), (i, j), block_px), has_photons.sum() / views * FILM_BLOCKS**2
+
+
+def _rays(
+    counts: PhotonCounts,
+    cameras: tuple[np.ndarray, np.ndarray],
+    pixels: tuple[np.ndarray, np.ndarray],
+    block_px: int,
+) -> tuple[np.ndarray, ...]:
+    """The (u, v, a, b) (N,) float32 of `sheet_kernels` at places on the films of cameras, in px."""
+    grid, (across, down) = counts.grid, parallax_per_total(counts.grid)
+    rows, cols = cameras[0] - (grid.rows - 1) / 2, cameras[1] - (grid.cols - 1) / 2
+    at = pixels[0] - rows * grid.shear_px[1], pixels[1] - cols * grid.shear_px[0]
+    moves = rows * down, cols * across
+    return tuple((part / block_px).astype(np.float32) for part in (*at, *moves))

@@ -1,0 +1,85 @@
+"""Textures of sheets: how bright blocks are, from the photons that reach them, in windows as wide as needed.
+
+A texture in narrow windows is noise, in wide ones it is blurred, and which is better differs from place to
+place. So there are windows of several widths, and those that predict the photons around best count most, each
+photon predicted by the others (the likelihood of leave-one-out).
+"""
+
+from functools import cache
+
+import numpy as np
+
+from pcii.depth.sheet_kernels import level_likelihoods, mix_levels
+from pcii.depth.sheets import SheetModel
+from pcii.evidence.octave_kernels import doubled, gaussian_mean
+from pcii.imaging.blocks import block_sums
+
+
+def textures(
+    photons: np.ndarray,
+    exposure: np.ndarray,
+    mask: np.ndarray,
+    mean: np.ndarray,
+    samples: np.ndarray,
+    model: SheetModel,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The texture (Q, h, w) of a sheet in photons per sample, and the share (Q, h, w) of each photon in it.
+
+    `photons` (Q, h, w) reach each block and `exposure` (h, w) views do; `mask` (h, w), of which each view has
+    `samples` (Q,) in a block; `mean` (Q,) is the brightness of all.
+    """
+    weight = np.maximum(mask, np.float32(model.least_weight))
+    weighted = np.concatenate([photons * weight, (exposure * weight)[None]])
+    Q, h, w = photons.shape
+    rate, share = np.empty((model.octaves, Q, h, w), np.float32), np.empty((model.octaves, h, w), np.float32)
+    nats = np.empty((model.octaves, h, w), np.float32)
+    levels = _levels(weighted, mean, samples, model)
+    for octave, level in enumerate(levels):
+        rate[octave], share[octave] = level[:Q], level[Q] * weight
+        of_blocks = level_likelihoods(weighted, rate[octave], share[octave], samples)
+        nats[octave] = gaussian_mean(of_blocks, gaussian_weights(model.window_blocks))
+    nats *= np.float32(2 * np.pi * model.window_blocks**2)
+    return mix_levels(nats, rate, share, samples)
+
+
+def smooth_texture(
+    photons: np.ndarray, exposure: np.ndarray, mean: np.ndarray, samples: np.ndarray, model: SheetModel
+) -> np.ndarray:
+    """The texture (Q, h, w) in the widest windows alone."""
+    sums = np.concatenate([photons, exposure[None]])
+    return _levels(sums, mean, samples, model, model.octaves - 1)[0][:-1]
+
+
+def _levels(
+    sums: np.ndarray, mean: np.ndarray, samples: np.ndarray, model: SheetModel, first: int = 0
+) -> list[np.ndarray]:
+    """Of each octave from the first the textures and the share of a photon at its own block, (Q + 1, h, w).
+
+    Octaves have blocks twice as large as the one before.
+    """
+    levels, least = list[np.ndarray](), np.float32(model.least)
+    shapes = list[tuple[int, ...]]()
+    for octave in range(model.octaves):
+        if octave > 0:
+            sums = block_sums(sums, 2, np.float32) / 4
+        shapes.append(sums.shape)
+        if octave < first:
+            continue
+        smooth = np.stack([gaussian_mean(part, gaussian_weights(1.0)) for part in sums])
+        exposure = smooth[-1] + least
+        # Light is bounded from below, so that no photon is impossible.
+        rate = (smooth[:-1] / samples[:, None, None] + least * mean[:, None, None]) / exposure
+        own = np.float32(1 / (2 * np.pi * 4**octave)) / exposure
+        level = np.concatenate([np.maximum(rate, least * mean[:, None, None]), own[None]])
+        for shape in reversed(shapes[:-1]):
+            level = doubled(level, shape[1], shape[2])
+        levels.append(level)
+    return levels
+
+
+@cache
+def gaussian_weights(sigma: float) -> np.ndarray:
+    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian, 3 standard deviations."""
+    away = np.arange(int(3 * sigma + 0.5) + 1)
+    weight = np.exp(-((away / sigma) ** 2) / 2)
+    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)

@@ -1,0 +1,214 @@
+"""Sheets, the few surfaces that a posterior of depth consists of, and what is known of each block of them.
+
+A sheet has a depth everywhere, also behind others and beyond its outline, and a mask, the probability that it
+is there. Masks are of sheets and not of what is seen: from near to far, a sheet is seen where it is there and
+nothing nearer is. Arrays: L sheets, h x w blocks, R requested planes; depths in px of total disparity.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pcii.types.estimates import most_probable_planes
+
+
+@dataclass(frozen=True)
+class SheetModel:
+    """What is assumed of sheets; docs/experiments/depth.md has what the numbers change."""
+
+    neighbour_blocks: float = 0.75
+    """Neighbouring blocks whose depths differ by less are of one part, in total disparity."""
+    least_blocks: int = 250
+    """Of a part that is a sheet. If it is larger, small things stay as the network sees them; if smaller,
+    noise is a sheet, and each takes its time."""
+    most_sheets: int = 9
+    """Besides flat ones at requested planes; the largest parts."""
+    same_blocks: float = 2.5
+    """Depths nearer to each other are of one sheet: of parts on average, of a requested plane and the middle
+    of a sheet, of a plane of the posterior and a sheet at a block."""
+    window_blocks: float = 3.0
+    """Standard deviation of the window in which photons decide, and of a Gaussian over the depths of a sheet.
+    If it is larger, small things are lost; if smaller, noise decides."""
+    octaves: int = 6
+    """Textures are smoothed by Gaussians with standard deviations of 1, 2, 4, ... blocks; the light without
+    depth by the last. With fewer, plain things have noise for texture in little light."""
+    least_weight: float = 0.2
+    """Weight in a sheet's texture of blocks where the sheet is not, or not yet: where it is, it is the mask.
+    If it is smaller, a hidden sheet has no texture before it has a mask; if larger, its texture is mixed with
+    what hides it."""
+    least: float = 0.02
+    """What is less is nothing: of a probability, and of the mean brightness."""
+    most_nats: float = 6.0
+    """That a block counts for or against a mask, in the mean of a window: textures are blurred and depths
+    are not exact. If it is larger, outlines grow into dark surroundings in much light; if smaller, the
+    network decides."""
+    most_photons: int = 1 << 20
+    """Of more, as many are chosen at random: the time that a sweep takes at most."""
+    cameras: int = 4
+    """Along either axis, of which it is computed what they see of each block."""
+    sweeps: int = 6
+    """At most, as long as the objective rises; with none masks are the network's own."""
+    step: float = 0.8
+    """Share of the way to the best masks in a sweep. If it is larger, sheets swap places; if smaller, more
+    sweeps are needed."""
+
+
+class Sheets(NamedTuple):
+    """Depths `total_px` (L, h, w) float32, nearer than `same_px` to each other where they are the same; the
+    `probability` (L, h, w) float32 that a sheet is what is seen; whether it `is_at` (R, L) a requested plane;
+    and the numbers of the sheets from near to far, `order` (L, h, w)."""
+
+    total_px: np.ndarray
+    same_px: float
+    probability: np.ndarray
+    is_at: np.ndarray
+    order: np.ndarray
+
+    def masks(self, least: float) -> np.ndarray:
+        """The probability (L, h, w) float32 that each is there, from `least` to 1 - `least`.
+
+        Where all is hidden by nearer ones none is there.
+        """
+        seen = np.take_along_axis(self.probability, self.order, axis=0)
+        nearer = np.cumsum(seen, axis=0) - seen
+        masks = np.empty_like(seen)
+        np.put_along_axis(masks, self.order, seen / (1 - nearer + np.float32(least)), axis=0)
+        return masks.clip(least, 1 - least)
+
+    def seen(self, masks: np.ndarray) -> np.ndarray:
+        """The probability (L, h, w) that each is what is seen: it is there, and nothing nearer is."""
+        seen, light = np.empty_like(masks), np.ones_like(masks[:1])
+        for rank in self.order:
+            own = np.take_along_axis(masks, rank[None], axis=0)
+            np.put_along_axis(seen, rank[None], light * own, axis=0)
+            light = light * (1 - own)
+        return seen
+
+
+class Posterior(NamedTuple):
+    """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
+    requested planes (R, h, w)."""
+
+    planes: np.ndarray
+    no_surface: np.ndarray
+    in_focus: np.ndarray
+
+
+def cut_sheets(
+    posterior: Posterior,
+    planes_px: np.ndarray,
+    requested_px: np.ndarray,
+    block_px: int,
+    model: SheetModel,
+) -> Sheets:
+    """The sheets of a posterior of planes at `planes_px` (Z,).
+
+    They are connected parts of smooth depth, those at the same depth in one; and flat ones at the requested
+    planes (R,) at which there is none. There may be none at all.
+    """
+    from pcii.depth.sheet_kernels import share_planes
+
+    same_px = model.same_blocks * block_px
+    total_px = most_probable_planes(posterior.planes, planes_px)[2]
+    depths = [*_smooth_parts(total_px, posterior.no_surface[0] < 0.5, block_px, model)]
+    middle_px = [float(np.median(depth[own])) for own, depth in depths]
+    sheets = [depth for _, depth in depths]
+    for plane_px in requested_px:
+        if not any(abs(plane_px - px) < same_px for px in middle_px):
+            middle_px.append(float(plane_px))
+            sheets.append(np.full(total_px.shape, plane_px, np.float32))
+    shape = (len(sheets), *total_px.shape)
+    total = np.array(sheets, np.float32).reshape(shape)
+    is_at = np.abs(np.subtract.outer(requested_px, middle_px)) < same_px
+    probability = np.zeros(shape, np.float32)
+    share_planes(probability, posterior.planes, planes_px, total, same_px)
+    # An object in focus is a surface, also where the network does not know its depth.
+    claimed = np.zeros(shape, np.float32)
+    for in_focus, own in zip(posterior.in_focus, is_at, strict=True):
+        of_plane = probability[own] + np.finfo(np.float32).eps
+        claimed[own] += in_focus * of_plane / of_plane.sum(axis=0)
+    np.maximum(probability, claimed, out=probability)
+    probability /= np.maximum(probability.sum(axis=0), 1)
+    return Sheets(total, same_px, probability, is_at, np.argsort(-total, axis=0))
+
+
+def in_focus_after(
+    in_focus: np.ndarray, sheets: Sheets, before: np.ndarray, after: np.ndarray, least: float
+) -> np.ndarray:
+    """The probability (R, h, w) of being in focus at requested planes, after sheets that were seen with the
+    probabilities `before` (L, h, w) are seen with those `after`.
+
+    It grows by as much as the sheets at the plane do, each together with those at the same depth, and that of
+    no plane by as much as the others and the light without depth. Where nothing changes it does not either.
+    """
+    old, new = (
+        np.concatenate([_with_near(sheets, seen), 1 - seen.sum(axis=0, keepdims=True)]) + np.float32(least)
+        for seen in (before, after)
+    )
+    weight = np.concatenate([before, 1 - before.sum(axis=0, keepdims=True)]) + np.finfo(np.float32).eps
+    of_none = np.append(~sheets.is_at.any(axis=0), True)
+    rows = [np.append(own, False) for own in sheets.is_at] + [of_none]
+    claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
+    for probability, own in zip(claimed, rows, strict=True):
+        probability *= (weight[own] * new[own] / old[own]).sum(axis=0) / weight[own].sum(axis=0)
+    return claimed[:-1] / claimed.sum(axis=0)
+
+
+def _with_near(sheets: Sheets, seen: np.ndarray) -> np.ndarray:
+    """The probability (L, h, w) that a sheet, or another at its depth, is what is seen."""
+    depths, same_px = sheets.total_px, sheets.same_px
+    return np.stack([(seen * (np.abs(depths - own) < same_px)).sum(axis=0) for own in depths])
+
+
+def _smooth_parts(
+    total_px: np.ndarray, is_surface: np.ndarray, block_px: int, model: SheetModel
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Connected parts of smooth depth, the largest first: their blocks (h, w) bool and their depth, continued
+    to all blocks. Parts that continue each other are one."""
+    parts = list[tuple[np.ndarray, np.ndarray]]()
+    for own in _connected(total_px, is_surface, block_px, model):
+        depth = _continued(total_px, own, model.window_blocks)
+        for place, (others, other) in enumerate(parts):
+            apart_px = _mean_distance(other, total_px, own), _mean_distance(depth, total_px, others)
+            if max(apart_px) < model.same_blocks * block_px:
+                together = own | others
+                parts[place] = together, _continued(total_px, together, model.window_blocks)
+                break
+        else:
+            parts.append((own, depth))
+    return sorted(parts, key=lambda part: -int(part[0].sum()))[: model.most_sheets]
+
+
+def _connected(
+    total_px: np.ndarray, is_surface: np.ndarray, block_px: int, model: SheetModel
+) -> list[np.ndarray]:
+    """Connected parts (h, w) bool of a surface whose depth differs little from block to block, the largest
+    first."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    number, near_px = np.arange(total_px.size).reshape(total_px.shape), model.neighbour_blocks * block_px
+    pairs = list[np.ndarray]()
+    for axis in (0, 1):
+        depth, surface, block = (np.moveaxis(part, axis, 0) for part in (total_px, is_surface, number))
+        joined = surface[1:] & surface[:-1] & (np.abs(np.diff(depth, axis=0)) < near_px)
+        pairs.append(np.stack([block[1:][joined], block[:-1][joined]]))
+    ends = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(ends.shape[1], bool), tuple(ends)), shape=(number.size, number.size))
+    label = connected_components(graph, directed=False)[1].reshape(total_px.shape)
+    blocks = np.bincount(label[is_surface])
+    largest = np.argsort(-blocks, kind="stable")
+    return [(label == part) & is_surface for part in largest if blocks[part] >= model.least_blocks]
+
+
+def _mean_distance(depth: np.ndarray, total_px: np.ndarray, part: np.ndarray) -> float:
+    return float(np.abs(depth - total_px)[part].mean())
+
+
+def _continued(total_px: np.ndarray, part: np.ndarray, sigma: float) -> np.ndarray:
+    """The depth (h, w) float32 of a part, everywhere that of its nearest block, smoothed."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    nearest: Any = distance_transform_edt(~part, return_distances=False, return_indices=True)
+    return gaussian_filter(total_px[tuple(nearest)].astype(np.float32), sigma, mode="nearest")

@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from scipy.ndimage import uniform_filter
+from twins import unit_grid
+
+from pcii.depth.explained_views import ExplainedViews, explain
+from pcii.depth.sheets import Posterior, SheetModel, Sheets, cut_sheets, in_focus_after
+from pcii.types.photon_counts import PhotonCounts
+
+SIDE, CAMERAS, MARGIN = 48, 5, 16
+NEAR_STEP, FAR_STEP = 5, 2
+"""Disparity in px per camera of bars and of the wall behind them."""
+
+
+def bars(width: int = 10, first: int = 8) -> np.ndarray:
+    """Which blocks of the film of the virtual centre show bars (h, w)."""
+    columns = (np.arange(SIDE) - first) % 24 < width
+    return np.broadcast_to(columns, (SIDE, SIDE)) & (np.arange(SIDE) >= first)
+
+
+def draw(photons_per_px: float, seed: int, shown: np.ndarray) -> PhotonCounts:
+    """Counts of bars before a wall, both with a texture of their own, seen by 5 x 5 cameras."""
+    random, grid = np.random.default_rng(seed), unit_grid(CAMERAS, CAMERAS, SIDE, SIDE)
+    wall, bar = (random.choice([0.3, 1.7], (SIDE + 2 * MARGIN,) * 2) for _ in range(2))
+    wide = np.pad(shown, MARGIN)
+    rate = np.empty(grid.shape_KLHW)
+    for k, l in np.ndindex(CAMERAS, CAMERAS):
+        near, far = (
+            tuple(slice(MARGIN + step * (n - 2), MARGIN + step * (n - 2) + SIDE) for n in (k, l))
+            for step in (NEAR_STEP, FAR_STEP)
+        )
+        rate[k, l] = np.where(wide[near], bar[near], wall[far])
+    return PhotonCounts.from_dense(random.poisson(photons_per_px * rate), grid)
+
+
+def sheets_of(shown: np.ndarray) -> Sheets:
+    """The bars and the wall, known for sure."""
+    total = np.stack([np.full((SIDE, SIDE), 4.0 * step, np.float32) for step in (NEAR_STEP, FAR_STEP)])
+    probability = np.stack([shown, ~shown]).astype(np.float32)
+    return Sheets(total, 2.5, probability, np.eye(2, dtype=bool), np.argsort(-total, axis=0))
+
+
+@pytest.mark.parametrize("photons_per_px", [0.15, 0.3, 0.6, 1.2, 2.4])
+def test_the_right_sheets_explain_photons_best(photons_per_px: float) -> None:
+    shown = bars()
+    missing = shown & (np.arange(SIDE) < 30)
+    wider, moved = bars(width=12), bars(first=10)
+    best = 0
+    for seed in range(20):
+        counts = draw(photons_per_px, seed, shown)
+        right, *wrong = (
+            ExplainedViews(counts, sheets_of(masks), 1, SheetModel()).objective()
+            for masks in (shown, missing, wider, moved)
+        )
+        best += right > max(wrong)
+    assert best >= 19
+
+
+@pytest.mark.parametrize(("photons_per_px", "least"), [(0.1, 0.75), (1.0, 0.9), (10.0, 0.95)])
+def test_sweeps_find_the_bars_and_never_lower_the_objective(photons_per_px: float, least: float) -> None:
+    shown = bars()
+    # Where there may be bars the network takes them for a little more probable than the wall.
+    taken = np.where(np.arange(SIDE) < 8, 0.1, 0.6) * np.ones((SIDE, SIDE))
+    doubtful = sheets_of(shown)._replace(probability=np.stack([taken, 1 - taken]).astype(np.float32))
+    views = ExplainedViews(draw(photons_per_px, 0, shown), doubtful, 1, SheetModel())
+    objectives = [views.objective()]
+    while views.sweep() and len(objectives) < 12:
+        objectives.append(views.objective())
+    assert (np.diff(objectives) >= 0).all()
+    found = views.state.masks[0] > 0.5
+    # Photons of a window of 3 blocks decide, so outlines may be 2 blocks off.
+    sure = uniform_filter(shown.astype(float), 5)
+    is_sure = (sure < 0.01) | (sure > 0.99)
+    assert (found == shown)[is_sure].mean() > least
+
+
+def test_where_photons_say_nothing_the_network_stays() -> None:
+    shown = bars()
+    sheets = sheets_of(shown)
+    in_focus = np.random.default_rng(0).random((2, SIDE, SIDE)).astype(np.float32) / 2
+    counts = draw(1.0, 0, shown)
+    before, after = explain(counts, sheets, 1, SheetModel(sweeps=0))
+    np.testing.assert_allclose(in_focus_after(in_focus, sheets, before, after, 0.02), in_focus, atol=1e-5)
+
+
+def test_sheets_are_the_connected_parts_of_smooth_depth_and_requested_planes() -> None:
+    planes_px = np.arange(5.0, 25.0)
+    rows = np.arange(SIDE)
+    slope_px = 8 + rows / 12  # to 12 px, one block after the other by less than a plane
+    depth_px = np.where(rows[:, None] < 8 + rows[:, None] // 2, slope_px[:, None], 20.0) * np.ones(SIDE)
+    depth_px[30:, 30:] = 20.0
+    near = np.abs(depth_px - planes_px[:, None, None])
+    planes = np.maximum(1 - near, 0).astype(np.float32)
+    posterior = Posterior(
+        planes, np.zeros((1, SIDE, SIDE), np.float32), np.zeros((2, SIDE, SIDE), np.float32)
+    )
+    sheets = cut_sheets(posterior, planes_px, np.array([20.5, 15.0]), 1, SheetModel())
+    middle_px = np.median(sheets.total_px, axis=(1, 2))
+    assert len(middle_px) == 3
+    assert sheets.is_at.sum(axis=1).tolist() == [1, 1]
+    assert middle_px[sheets.is_at[1]] == pytest.approx([15.0])
+    seen = sheets.probability.argmax(axis=0)
+    np.testing.assert_array_equal(middle_px[seen] > 15, depth_px == 20.0)
