@@ -29,6 +29,7 @@ from pcii.types.photon_counts import PhotonCounts
 
 FILM_BLOCKS = 2
 """Every so many blocks along either axis of a film it is computed what is seen there."""
+TINY = np.finfo(np.float32).tiny
 HALVINGS = 2
 """Of a step that lowers the objective. After them masks stay as they are."""
 
@@ -65,7 +66,7 @@ class ExplainedViews:
         self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
         of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
         seen = self.samples * self.ray_views * len(self.film.blocks)
-        self.mean = np.maximum(of_colours / seen, np.finfo(np.float32).tiny).astype(np.float32)
+        self.mean = np.maximum(of_colours / seen, TINY).astype(np.float32)
         self.state = self._state(self.prior)
 
     def objective(self) -> float:
@@ -88,7 +89,8 @@ class ExplainedViews:
         """The most probable masks (L, h, w) if all else stays as it is.
 
         The logit of each is that of the network, and what the photons around say, as the mean of a window:
-        each block as if all of its window were like it, but no more than `most_nats`.
+        each block as if all of its window were like it, but no more than `most_nats`. The mean is shrunk by
+        its noise, which is how much the blocks of the window differ (James and Stein 1961).
         """
         model = self.model
         weights, nearest = gaussian_weights(model.window_blocks), gaussian_weights(1.0)
@@ -97,7 +99,11 @@ class ExplainedViews:
         def of_sheet(sheet: int) -> np.ndarray:
             nats = window * gaussian_mean(self.state.slope[sheet], nearest)
             prior = self.prior[sheet]
-            odds = np.exp(gaussian_mean(nats.clip(-model.most_nats, model.most_nats), weights))
+            nats = nats.clip(-model.most_nats, model.most_nats)
+            said = gaussian_mean(nats, weights)
+            # Of the blocks of a window, seen in windows of 1 block, as many as its variance are independent.
+            noise = (gaussian_mean(nats**2, weights) - said**2).clip(0) / np.float32(model.window_blocks**2)
+            odds = np.exp(said * (1 - noise / np.maximum(said**2, np.maximum(noise, TINY))))
             odds *= prior / (1 - prior)
             return odds / (1 + odds)
 

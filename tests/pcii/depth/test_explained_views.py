@@ -59,8 +59,8 @@ def test_the_right_sheets_explain_photons_best(photons_per_px: float) -> None:
 @pytest.mark.parametrize(("photons_per_px", "least"), [(0.1, 0.75), (1.0, 0.9), (10.0, 0.95)])
 def test_sweeps_find_the_bars_and_never_lower_the_objective(photons_per_px: float, least: float) -> None:
     shown = bars()
-    # Where there may be bars the network takes them for a little more probable than the wall.
-    taken = np.where(np.arange(SIDE) < 8, 0.1, 0.6) * np.ones((SIDE, SIDE))
+    # Where there may be bars the network does not know which it is.
+    taken = np.where(np.arange(SIDE) < 8, 0.1, 0.5) * np.ones((SIDE, SIDE))
     doubtful = sheets_of(shown)._replace(probability=np.stack([taken, 1 - taken]).astype(np.float32))
     views = ExplainedViews(draw(photons_per_px, 0, shown), doubtful, 1, SheetModel())
     objectives = [views.objective()]
