@@ -20,18 +20,19 @@ import numpy as np
 
 from pcii.base.compiled_loops import each_in_threads
 from pcii.depth.sheet_kernels import add_up, expect_photons, explain_photons, meet_sheets, reach_sheets
-from pcii.depth.sheet_textures import gaussian_weights, smooth_texture, textures
+from pcii.depth.sheet_textures import smooth_texture, textures
 from pcii.depth.sheets import SheetModel, Sheets
-from pcii.evidence.octave_kernels import gaussian_mean
+from pcii.evidence.octave_kernels import gaussian_mean, gaussian_weights
 from pcii.imaging.blocks import evenly_chosen
 from pcii.types.geometry import parallax_per_total
 from pcii.types.photon_counts import PhotonCounts
 
 FILM_BLOCKS = 2
-"""Every so many blocks along either axis of a film it is computed what is seen there."""
+"""Distance in blocks between the places of a film for which expected photons are computed. If it is larger,
+sweeps are faster and expected numbers less exact."""
 TINY = np.finfo(np.float32).tiny
 HALVINGS = 2
-"""Of a step that lowers the objective. After them masks stay as they are."""
+"""How often a step that lowers the objective is halved before the masks stay as they are."""
 
 
 class Rays(NamedTuple):
@@ -55,8 +56,7 @@ class ExplainedViews:
     """The photons of all cameras, explained by sheets, whose masks are in `state`."""
 
     def __init__(self, counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> None:
-        self.sheets, self.model = sheets, model
-        self.shape = sheets.total_px.shape[1:]
+        self.model = model
         self.prior = sheets.masks(model.least)
         colours = np.array([1.0]) if counts.cfa is None else np.array([0.25, 0.5, 0.25])
         self.samples = (colours * block_px**2).astype(np.float32)
@@ -65,8 +65,8 @@ class ExplainedViews:
         film, self.ray_views = _film_rays(counts, block_px, model.cameras)
         self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
         of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
-        seen = self.samples * self.ray_views * len(self.film.blocks)
-        self.mean = np.maximum(of_colours / seen, TINY).astype(np.float32)
+        film_samples = self.samples * self.ray_views * len(self.film.blocks)
+        self.mean = np.maximum(of_colours / film_samples, TINY).astype(np.float32)
         self.state = self._state(self.prior)
 
     def objective(self) -> float:
@@ -93,17 +93,19 @@ class ExplainedViews:
         its noise, which is how much the blocks of the window differ (James and Stein 1961).
         """
         model = self.model
-        weights, nearest = gaussian_weights(model.window_blocks), gaussian_weights(1.0)
+        weights, nearest = gaussian_weights(model.window_blocks, 3), gaussian_weights(1.0, 3)
         window = np.float32(2 * np.pi * model.window_blocks**2)
 
         def of_sheet(sheet: int) -> np.ndarray:
             nats = window * gaussian_mean(self.state.slope[sheet], nearest)
             prior = self.prior[sheet]
             nats = nats.clip(-model.most_nats, model.most_nats)
-            said = gaussian_mean(nats, weights)
+            mean_nats = gaussian_mean(nats, weights)
             # Of the blocks of a window, seen in windows of 1 block, as many as its variance are independent.
-            noise = (gaussian_mean(nats**2, weights) - said**2).clip(0) / np.float32(model.window_blocks**2)
-            odds = np.exp(said * (1 - noise / np.maximum(said**2, np.maximum(noise, TINY))))
+            noise = (gaussian_mean(nats**2, weights) - mean_nats**2).clip(0) / np.float32(
+                model.window_blocks**2
+            )
+            odds = np.exp(mean_nats * (1 - noise / np.maximum(mean_nats**2, np.maximum(noise, TINY))))
             odds *= prior / (1 - prior)
             return odds / (1 + odds)
 
@@ -114,19 +116,21 @@ class ExplainedViews:
         L, h, w = masks.shape
         Q, photons, film = self.samples.size, self.photons, self.film
         flat = masks.reshape(L, -1)
-        reach, seen = (np.empty(rays.blocks.shape, np.float32) for rays in (photons, film))
-        reach_sheets(photons.blocks, photons.order, flat, reach)
-        reach_sheets(film.blocks, film.order, flat, seen)
+        photon_reach, film_reach = (np.empty(rays.blocks.shape, np.float32) for rays in (photons, film))
+        reach_sheets(photons.blocks, photons.order, flat, photon_reach)
+        reach_sheets(film.blocks, film.order, flat, film_reach)
         reached, exposure = np.zeros((L + 1, Q, h * w), np.float32), np.zeros((L + 1, 1, h * w), np.float32)
-        add_up(reached, photons.blocks, photons.colour, reach)
-        add_up(exposure, film.blocks, film.colour, seen)
+        add_up(reached, photons.blocks, photons.colour, photon_reach)
+        add_up(exposure, film.blocks, film.colour, film_reach)
         exposure *= np.float32(self.ray_views)
-        T, own = self._textures(masks, reached.reshape(L + 1, Q, h, w), exposure.reshape(L + 1, h, w))
-        of_sheets = flat, T.reshape(Q, L + 1, -1), own.reshape(Q, L, -1)
+        T, photon_share = self._textures(
+            masks, reached.reshape(L + 1, Q, h, w), exposure.reshape(L + 1, h, w)
+        )
+        of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons, reach, of_sheets, gain))
+        likelihood = sum(explain_photons(*photons, photon_reach, of_sheets, gain))
         samples = self.samples * np.float32(self.ray_views)
-        expected = sum(expect_photons(film.blocks, film.order, samples, seen, of_sheets, loss))
+        expected = sum(expect_photons(film.blocks, film.order, samples, film_reach, of_sheets, loss))
         no_colour = np.zeros(len(gain), np.int8)
         more, less = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
         add_up(more, photons.blocks, no_colour, gain)
@@ -141,17 +145,17 @@ class ExplainedViews:
         a photon in each, from what reaches their blocks."""
         L, Q, common = len(masks), self.samples.size, (self.mean, self.samples, self.model)
         T = np.empty((Q, L + 1, *masks.shape[1:]), np.float32)
-        own = np.empty((Q, L, *masks.shape[1:]), np.float32)
+        photon_share = np.empty((Q, L, *masks.shape[1:]), np.float32)
 
         def of_sheet(sheet: int) -> None:
             if sheet == L:
                 T[:, L] = smooth_texture(reached[L], exposure[L], *common)
             else:
                 both = textures(reached[sheet], exposure[sheet], masks[sheet], *common)
-                T[:, sheet], own[:, sheet] = both
+                T[:, sheet], photon_share[:, sheet] = both
 
         each_in_threads(of_sheet, range(L + 1))
-        return T, own
+        return T, photon_share
 
 
 def explain(
@@ -162,7 +166,7 @@ def explain(
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    return sheets.seen(views.prior), sheets.seen(views.state.masks)
+    return sheets.visible(views.prior), sheets.visible(views.state.masks)
 
 
 def _met(sheets: Sheets, rays: tuple[np.ndarray, ...], colour: np.ndarray) -> Rays:
@@ -193,18 +197,18 @@ def _film_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np
     """
     grid, side = counts.grid, FILM_BLOCKS * block_px
     has_photons = (np.diff(counts.view_starts) > 0).reshape(grid.rows, grid.cols)
-    chosen = [
+    cameras = [
         (k, l, (row + 2 * (col % 2)) % 4, (col + 2 * (row % 2)) % 4)
         for row, k in enumerate(evenly_chosen(grid.rows, most))
         for col, l in enumerate(evenly_chosen(grid.cols, most))
         if has_photons[k, l]
     ] or [(k, l, 1.5, 1.5) for k, l in np.argwhere(has_photons)[:1]]
     rows, cols = np.arange(0, grid.height, side), np.arange(0, grid.width, side)
-    views, across = len(chosen), (len(rows), len(cols))
-    k, l, down, right = (np.array(part)[:, None, None] for part in zip(*chosen, strict=True))
+    views, film_shape = len(cameras), (len(rows), len(cols))
+    k, l, down, right = (np.array(part)[:, None, None] for part in zip(*cameras, strict=True))
     i = rows[:, None] + (down + 0.5) * side / 4
     j = cols + (right + 0.5) * side / 4
-    places = (np.broadcast_to(part, (views, *across)).ravel() for part in (k, l, i, j))
+    places = (np.broadcast_to(part, (views, *film_shape)).ravel() for part in (k, l, i, j))
     k, l, i, j = places
     return _rays(counts, (k, l), (i, j), block_px), has_photons.sum() / views * FILM_BLOCKS**2
 

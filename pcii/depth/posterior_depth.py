@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
-from pcii.depth.sheets import Posterior, SheetModel, cut_sheets, in_focus_after
+from pcii.depth.sheets import SheetModel, cut_sheets, in_focus_after
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
@@ -56,10 +56,11 @@ NO_DEPTHS = np.zeros(0)
 
 
 class FilmOutputs(NamedTuple):
-    """What the network says, and of `TextureEvidence` the photons (Z, h / 4, w / 4), and `nats` at the
-    `planes` that it was made for."""
+    """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
+    requested planes (R, h, w). Of `TextureEvidence` the photons (Z, h / 4, w / 4), and `nats` at the planes
+    that it was made for."""
 
-    maps: Posterior
+    maps: tuple[np.ndarray, np.ndarray, np.ndarray]
     photons: np.ndarray
     planes: FocalPlanes
     nats: np.ndarray
@@ -127,16 +128,16 @@ class PosteriorDepth:
                 mean += doubled(other, *mean.shape[1:])
                 mean /= 2
         probability, nothing, in_focus = network.maps
-        if isinstance(data, PhotonCounts) and z_mm.size:
-            in_focus = self._explained(data, planes, network.maps, block_px, z_mm)
-        maps = probability, nothing[0], block_px, in_focus[order]
+        maps = probability, nothing[0], block_px, in_focus
         nowhere = np.zeros(nothing[0].shape, bool)
-        result = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
-        plane, _, total_px = result.most_probable()
+        posterior = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
+        plane, _, total_px = posterior.most_probable()
+        if isinstance(data, PhotonCounts) and z_mm.size:
+            in_focus = self._explained_focus(data, posterior, total_px, z_mm)
         is_inside = _is_between(total_px, answered_px)
         is_possible = self._has_photons(network.photons, plane, block_px)
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
-            is_possible &= result.no_surface <= self.max_empty
+            is_possible &= posterior.no_surface <= self.max_empty
         total_px = on_pixels(total_px, block_px, data.grid.shape_HW)
         side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
         depth = _nearest(coarse.planes, total_px[::side_px, ::side_px])
@@ -145,19 +146,19 @@ class PosteriorDepth:
             for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
         )
         is_detected = is_inside & self._detected(is_possible, shown & is_inside)
-        return replace(result, is_detected=is_detected, is_supported=supported)
+        in_focus = in_focus[order]
+        return replace(posterior, in_focus=in_focus, is_detected=is_detected, is_supported=supported)
 
-    def _explained(
-        self, counts: PhotonCounts, planes: FocalPlanes, posterior: Posterior, block_px: int, z_mm: np.ndarray
+    def _explained_focus(
+        self, counts: PhotonCounts, posterior: DepthPosterior, total_px: np.ndarray, z_mm: np.ndarray
     ) -> np.ndarray:
         """The probability (R, h, w) of being in focus, after sheets explain the photons of all cameras."""
         from pcii.depth.explained_views import explain
 
-        requested_px = total_disparity_px(counts.grid, z_mm)
-        sheets = cut_sheets(posterior, planes.total_disparity_px, requested_px, block_px, self.sheets)
+        sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), self.sheets)
         if not sheets.probability.any():
             return posterior.in_focus
-        before, after = explain(counts, sheets, block_px, self.sheets)
+        before, after = explain(counts, sheets, posterior.block_px, self.sheets)
         return in_focus_after(posterior.in_focus, sheets, before, after, self.sheets.least)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
@@ -205,9 +206,7 @@ class PosteriorDepth:
             nothing[:, *part] = outputs.no_surface[:h, :w]
             in_focus[:, *part] = outputs.in_focus[:, :h, :w]
         nearest = np.linspace(0, len(own_planes) - 1, len(planes)).round().astype(int)
-        return FilmOutputs(
-            Posterior(probability, nothing, in_focus), evidence.photons[nearest], own_planes, nats
-        )
+        return FilmOutputs((probability, nothing, in_focus), evidence.photons[nearest], own_planes, nats)
 
     def _detected(self, is_possible: np.ndarray, shown: np.ndarray) -> np.ndarray:
         """Where a surface is detected (h, w) bool, from where one is possible and where a depth is shown."""

@@ -66,11 +66,11 @@ def meet_sheets(
 def reach_sheets(
     first: int, last: int, blocks: np.ndarray, order: np.ndarray, m: np.ndarray, reach: np.ndarray
 ) -> None:
-    """Fill `reach` (N, L + 1) float32, the t of all sheets and of the light without depth, from m (L, n)."""
+    """Fill `reach` (N, L + 1) float32, the t of sheets that are met and of the light without depth, from
+    m (L, n)."""
     L = len(m)
     for ray in range(first, last):
         t, place = np.float32(1), 0
-        reach[ray] = 0
         while order[ray, place] < L:
             sheet = order[ray, place]
             reach[ray, sheet] = t
@@ -100,7 +100,6 @@ def explain_photons(
     total = 0.0
     for ray in range(first, last):
         q, behind, place = colour[ray], T[colour[ray], L, blocks[ray, L]], 0
-        gain[ray] = 0
         while order[ray, place] < L:
             place += 1
         for nearer in range(place - 1, -1, -1):
@@ -135,7 +134,6 @@ def expect_photons(
     total = 0.0
     for ray in range(first, last):
         place = 0
-        loss[ray] = 0
         while order[ray, place] < L:
             place += 1
         for q in range(samples.size):

@@ -5,13 +5,11 @@ place. So there are windows of several widths, and those that predict the photon
 photon predicted by the others (the likelihood of leave-one-out).
 """
 
-from functools import cache
-
 import numpy as np
 
 from pcii.depth.sheet_kernels import level_likelihoods, mix_levels
 from pcii.depth.sheets import SheetModel
-from pcii.evidence.octave_kernels import doubled, gaussian_mean
+from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
 from pcii.imaging.blocks import block_sums
 
 
@@ -37,7 +35,7 @@ def textures(
     for octave, level in enumerate(levels):
         rate[octave], share[octave] = level[:Q], level[Q] * weight
         of_blocks = level_likelihoods(weighted, rate[octave], share[octave], samples)
-        nats[octave] = gaussian_mean(of_blocks, gaussian_weights(model.window_blocks))
+        nats[octave] = gaussian_mean(of_blocks, gaussian_weights(model.window_blocks, 3))
     nats *= np.float32(2 * np.pi * model.window_blocks**2)
     return mix_levels(nats, rate, share, samples)
 
@@ -65,21 +63,13 @@ def _levels(
         shapes.append(sums.shape)
         if octave < first:
             continue
-        smooth = np.stack([gaussian_mean(part, gaussian_weights(1.0)) for part in sums])
+        smooth = np.stack([gaussian_mean(part, gaussian_weights(1.0, 3)) for part in sums])
         exposure = smooth[-1] + least
         # Light is bounded from below, so that no photon is impossible.
         rate = (smooth[:-1] / samples[:, None, None] + least * mean[:, None, None]) / exposure
-        own = np.float32(1 / (2 * np.pi * 4**octave)) / exposure
-        level = np.concatenate([np.maximum(rate, least * mean[:, None, None]), own[None]])
+        photon_share = np.float32(1 / (2 * np.pi * 4**octave)) / exposure
+        level = np.concatenate([np.maximum(rate, least * mean[:, None, None]), photon_share[None]])
         for shape in reversed(shapes[:-1]):
             level = doubled(level, shape[1], shape[2])
         levels.append(level)
     return levels
-
-
-@cache
-def gaussian_weights(sigma: float) -> np.ndarray:
-    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian, 3 standard deviations."""
-    away = np.arange(int(3 * sigma + 0.5) + 1)
-    weight = np.exp(-((away / sigma) ** 2) / 2)
-    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.types.estimates import most_probable_planes
+from pcii.types.estimates import DepthPosterior
 
 
 @dataclass(frozen=True)
@@ -70,48 +70,36 @@ class Sheets(NamedTuple):
 
         Where all is hidden by nearer ones none is there.
         """
-        seen = np.take_along_axis(self.probability, self.order, axis=0)
-        nearer = np.cumsum(seen, axis=0) - seen
-        masks = np.empty_like(seen)
-        np.put_along_axis(masks, self.order, seen / (1 - nearer + np.float32(least)), axis=0)
+        visible = np.take_along_axis(self.probability, self.order, axis=0)
+        nearer = np.cumsum(visible, axis=0) - visible
+        masks = np.empty_like(visible)
+        np.put_along_axis(masks, self.order, visible / (1 - nearer + np.float32(least)), axis=0)
         return masks.clip(least, 1 - least)
 
-    def seen(self, masks: np.ndarray) -> np.ndarray:
+    def visible(self, masks: np.ndarray) -> np.ndarray:
         """The probability (L, h, w) that each is what is seen: it is there, and nothing nearer is."""
-        seen, light = np.empty_like(masks), np.ones_like(masks[:1])
-        for rank in self.order:
-            own = np.take_along_axis(masks, rank[None], axis=0)
-            np.put_along_axis(seen, rank[None], light * own, axis=0)
-            light = light * (1 - own)
-        return seen
-
-
-class Posterior(NamedTuple):
-    """Probabilities, float32, of blocks: of planes (Z, h, w), of no surface (1, h, w), of being in focus at
-    requested planes (R, h, w)."""
-
-    planes: np.ndarray
-    no_surface: np.ndarray
-    in_focus: np.ndarray
+        visible, reach = np.empty_like(masks), np.ones_like(masks[:1])
+        for sheet in self.order:
+            mask = np.take_along_axis(masks, sheet[None], axis=0)
+            np.put_along_axis(visible, sheet[None], reach * mask, axis=0)
+            reach = reach * (1 - mask)
+        return visible
 
 
 def cut_sheets(
-    posterior: Posterior,
-    planes_px: np.ndarray,
-    requested_px: np.ndarray,
-    block_px: int,
-    model: SheetModel,
+    posterior: DepthPosterior, total_px: np.ndarray, requested_px: np.ndarray, model: SheetModel
 ) -> Sheets:
-    """The sheets of a posterior of planes at `planes_px` (Z,).
+    """The sheets of a posterior whose most probable depths are `total_px` (h, w).
 
     They are connected parts of smooth depth, those at the same depth in one; and flat ones at the requested
     planes (R,) at which there is none. There may be none at all.
     """
     from pcii.depth.sheet_kernels import share_planes
 
+    block_px = posterior.block_px
     same_px = model.same_blocks * block_px
-    total_px = most_probable_planes(posterior.planes, planes_px)[2]
-    depths = [*_smooth_parts(total_px, posterior.no_surface[0] < 0.5, block_px, model)]
+    # A surface is more probable than none.
+    depths = _smooth_parts(total_px, posterior.no_surface < 0.5, block_px, model)
     middle_px = [float(np.median(depth[own])) for own, depth in depths]
     sheets = [depth for _, depth in depths]
     for plane_px in requested_px:
@@ -122,7 +110,8 @@ def cut_sheets(
     total = np.array(sheets, np.float32).reshape(shape)
     is_at = np.abs(np.subtract.outer(requested_px, middle_px)) < same_px
     probability = np.zeros(shape, np.float32)
-    share_planes(probability, posterior.planes, planes_px, total, same_px)
+    planes_px = posterior.planes.total_disparity_px
+    share_planes(probability, posterior.probability, planes_px, total, same_px)
     # An object in focus is a surface, also where the network does not know its depth.
     claimed = np.zeros(shape, np.float32)
     for in_focus, own in zip(posterior.in_focus, is_at, strict=True):
@@ -143,8 +132,9 @@ def in_focus_after(
     no plane by as much as the others and the light without depth. Where nothing changes it does not either.
     """
     old, new = (
-        np.concatenate([_with_near(sheets, seen), 1 - seen.sum(axis=0, keepdims=True)]) + np.float32(least)
-        for seen in (before, after)
+        np.concatenate([_with_near(sheets, visible), 1 - visible.sum(axis=0, keepdims=True)])
+        + np.float32(least)
+        for visible in (before, after)
     )
     weight = np.concatenate([before, 1 - before.sum(axis=0, keepdims=True)]) + np.finfo(np.float32).eps
     of_none = np.append(~sheets.is_at.any(axis=0), True)
@@ -155,10 +145,10 @@ def in_focus_after(
     return claimed[:-1] / claimed.sum(axis=0)
 
 
-def _with_near(sheets: Sheets, seen: np.ndarray) -> np.ndarray:
+def _with_near(sheets: Sheets, visible: np.ndarray) -> np.ndarray:
     """The probability (L, h, w) that a sheet, or another at its depth, is what is seen."""
     depths, same_px = sheets.total_px, sheets.same_px
-    return np.stack([(seen * (np.abs(depths - own) < same_px)).sum(axis=0) for own in depths])
+    return np.stack([(visible * (np.abs(depths - own) < same_px)).sum(axis=0) for own in depths])
 
 
 def _smooth_parts(

@@ -3,6 +3,8 @@
 All in single precision, by loops along rows that the compiler takes several blocks at a time.
 """
 
+from functools import cache
+
 import numpy as np
 
 from pcii.base.compiled_loops import compiled, helper
@@ -29,6 +31,14 @@ def gaussian_mean(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
             right = line[reach + r : reach + r + w] if r > 0 else dark
             _add_pair(result[i], line[reach - r : reach - r + w], right, weight[r])
     return result
+
+
+@cache
+def gaussian_weights(sigma: float, deviations: int) -> np.ndarray:
+    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian, up to so many standard deviations."""
+    distance = np.arange(int(deviations * sigma + 0.5) + 1)
+    weight = np.exp(-((distance / sigma) ** 2) / 2)
+    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)
 
 
 @helper

@@ -163,7 +163,7 @@ def _of_section(
     """The e of each octave on its own grid, from the values of `_block_sums` and `_samples_of_blocks`."""
     from scipy.ndimage import gaussian_filter1d
 
-    from pcii.evidence.octave_kernels import gaussian_mean, octave_evidence
+    from pcii.evidence.octave_kernels import gaussian_mean, gaussian_weights, octave_evidence
 
     excess = list[np.ndarray]()
     for octave in range(model.octaves):
@@ -171,7 +171,7 @@ def _of_section(
             blocks = [block_sums(part, 2, np.float32) / 4 for part in blocks]
             number = tuple(map(_halved, number))
         finer = blocks[0], *number
-        blocks = [gaussian_mean(part, _weights(octave)) for part in blocks]
+        blocks = [gaussian_mean(part, gaussian_weights(_blur(octave), 4)) for part in blocks]
         number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
         of_model = _noise_weight(octave), model.averaging_error, model.contrast
         constants = np.array([*of_model, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
@@ -190,14 +190,6 @@ def _blur(octave: int) -> float:
     From single blocks to 1 in the finest octave, then from 1 to 2.
     """
     return 1.0 if octave == 0 else 3.0**0.5
-
-
-@cache
-def _weights(octave: int) -> np.ndarray:
-    """Weights (R + 1,) float32 of blocks 0 to R away in the blur of an octave, 4 standard deviations."""
-    away = np.arange(int(4 * _blur(octave) + 0.5) + 1)
-    weight = np.exp(-((away / _blur(octave)) ** 2) / 2)
-    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)
 
 
 @cache

@@ -127,27 +127,20 @@ class DepthPosterior(ShortForm):
 
         The last, in px of total disparity, is the mean over the plane and two on either side.
         """
-        return most_probable_planes(self.probability, self.planes.total_disparity_px)
-
-
-def most_probable_planes(
-    probability: np.ndarray, planes_px: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `DepthPosterior.most_probable`, of planes (Z, h, w) at total disparities (Z,)."""
-    padded = [0.0, *probability, 0.0]
-    confidence, plane = np.full_like(probability[0], -1), np.zeros(probability[0].shape, int)
-    for z, (before, own, after) in enumerate(zip(padded, padded[1:], padded[2:], strict=False)):
-        near = own + before + after
-        plane[near > confidence] = z
-        np.maximum(confidence, near, out=confidence)
-    confidence = np.minimum(confidence, 1.0)
-    at = plane + np.arange(-2, 3)[:, None, None]
-    inside = (at >= 0) & (at < len(probability))
-    at = np.clip(at, 0, len(probability) - 1)
-    weight = np.where(inside, np.take_along_axis(probability, at, axis=0), 0).astype(np.float64)
-    weight[2] += np.finfo(np.float32).tiny  # where all are 0 the plane itself is the mean
-    total_px = (weight * planes_px[at]).sum(axis=0) / weight.sum(axis=0)
-    return plane, confidence, total_px
+        padded = [0.0, *self.probability, 0.0]
+        confidence, plane = np.full_like(self.no_surface, -1), np.zeros(self.no_surface.shape, int)
+        for z, (before, own, after) in enumerate(zip(padded, padded[1:], padded[2:], strict=False)):
+            near = own + before + after
+            plane[near > confidence] = z
+            np.maximum(confidence, near, out=confidence)
+        confidence = np.minimum(confidence, 1.0)
+        at = plane + np.arange(-2, 3)[:, None, None]
+        inside = (at >= 0) & (at < len(self.planes))
+        at = np.clip(at, 0, len(self.planes) - 1)
+        weight = np.where(inside, np.take_along_axis(self.probability, at, axis=0), 0).astype(np.float64)
+        weight[2] += np.finfo(np.float32).tiny  # where all are 0 the plane itself is the mean
+        total_px = (weight * self.planes.total_disparity_px[at]).sum(axis=0) / weight.sum(axis=0)
+        return plane, confidence, total_px
 
 
 @dataclass(frozen=True, repr=False)

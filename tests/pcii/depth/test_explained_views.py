@@ -4,7 +4,9 @@ from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
 from pcii.depth.explained_views import ExplainedViews, explain
-from pcii.depth.sheets import Posterior, SheetModel, Sheets, cut_sheets, in_focus_after
+from pcii.depth.sheets import SheetModel, Sheets, cut_sheets, in_focus_after
+from pcii.types.estimates import DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 
 SIDE, CAMERAS, MARGIN = 48, 5, 16
@@ -91,10 +93,11 @@ def test_sheets_are_the_connected_parts_of_smooth_depth_and_requested_planes() -
     depth_px[30:, 30:] = 20.0
     near = np.abs(depth_px - planes_px[:, None, None])
     planes = np.maximum(1 - near, 0).astype(np.float32)
-    posterior = Posterior(
-        planes, np.zeros((1, SIDE, SIDE), np.float32), np.zeros((2, SIDE, SIDE), np.float32)
-    )
-    sheets = cut_sheets(posterior, planes_px, np.array([20.5, 15.0]), 1, SheetModel())
+    film, nowhere = (SIDE, SIDE), np.zeros((SIDE, SIDE), bool)
+    of_grid = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
+    no_surface, in_focus = np.zeros(film, np.float32), np.zeros((2, *film), np.float32)
+    posterior = DepthPosterior(of_grid, planes, no_surface, 1, in_focus, nowhere, nowhere)
+    sheets = cut_sheets(posterior, depth_px, np.array([20.5, 15.0]), SheetModel())
     middle_px = np.median(sheets.total_px, axis=(1, 2))
     assert len(middle_px) == 3
     assert sheets.is_at.sum(axis=1).tolist() == [1, 1]
