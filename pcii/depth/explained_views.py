@@ -1,4 +1,4 @@
-"""What the photons of all cameras say of the masks of sheets, by an objective that does not fall.
+"""What the photons of all cameras say of masks of sheets, by an objective that does not fall, and of depths.
 
 Each camera sees the sheets from near to far: where camera k looks at x, a photon has the density
 
@@ -10,8 +10,8 @@ reaches the blocks, so that all follows from the masks. The objective is the log
     F(m) = sum_photons log q - integral q,
 
 in which each photon is predicted by the others alone: what explains its own noise gains nothing. Masks start
-as the network has them, and move towards what it and the photons say together, as far as F rises
-(docs/theory.md, "What hides what").
+as the network has them, and move towards what it and the photons say together, as far as F rises. Depths
+follow by one step from those of the network (docs/theory.md, "What hides what").
 """
 
 from typing import NamedTuple
@@ -19,11 +19,18 @@ from typing import NamedTuple
 import numpy as np
 
 from pcii.base.compiled_loops import each_in_threads
-from pcii.depth.sheet_kernels import add_up, expect_photons, explain_photons, meet_sheets, reach_sheets
+from pcii.depth.sheet_kernels import (
+    add_up,
+    expect_photons,
+    explain_photons,
+    meet_sheets,
+    move_photons,
+    reach_sheets,
+)
 from pcii.depth.sheet_textures import smooth_texture, textures
 from pcii.depth.sheets import SheetModel, Sheets
-from pcii.evidence.octave_kernels import gaussian_mean, gaussian_weights
-from pcii.imaging.blocks import evenly_chosen
+from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
+from pcii.imaging.blocks import block_sums
 from pcii.types.geometry import parallax_per_total
 from pcii.types.photon_counts import PhotonCounts
 
@@ -36,36 +43,50 @@ HALVINGS = 2
 
 
 class Rays(NamedTuple):
-    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); `colour` (N,) int8."""
+    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); `colour` (N,) int8; and by
+    how many blocks down and to the right they move with each px of total disparity, `moves`."""
 
     blocks: np.ndarray
     order: np.ndarray
     colour: np.ndarray
+    moves: tuple[np.ndarray, np.ndarray]
 
 
 class State(NamedTuple):
     """`masks` (L, h, w), their `objective` in nats, and its `slope` (L, h, w): by how much more a block
-    explains if the sheet is there than if it is not, as all else stays."""
+    explains if the sheet is there than if it is not, as all else stays. Then what follows from the masks:
+    `textures` (Q, L + 1, h w), and how far photons and rays of the film `reach` (N, L + 1)."""
 
     masks: np.ndarray
     objective: float
     slope: np.ndarray
+    textures: np.ndarray
+    reach: tuple[np.ndarray, np.ndarray]
+
+
+class Explanation(NamedTuple):
+    """Probabilities (L, h, w) that each sheet is what is seen, `before` by the network alone and `after` by
+    the photons, and by how many px of total disparity it is nearer, `nearer_px` (L, h, w) float32."""
+
+    before: np.ndarray
+    after: np.ndarray
+    nearer_px: np.ndarray
 
 
 class ExplainedViews:
     """The photons of all cameras, explained by sheets, whose masks are in `state`."""
 
     def __init__(self, counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> None:
-        self.model = model
+        self.model, self.sheets = model, sheets
         self.prior = sheets.masks(model.least)
         colours = np.array([1.0]) if counts.cfa is None else np.array([0.25, 0.5, 0.25])
         self.samples = (colours * block_px**2).astype(np.float32)
         """Of each colour in a block of one view."""
         self.photons = _met(sheets, *_photon_rays(counts, block_px, model.most_photons))
-        film, self.ray_views = _film_rays(counts, block_px, model.cameras)
+        film, self.views = _film_rays(counts, block_px, model.cameras)
         self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
         of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
-        film_samples = self.samples * self.ray_views * len(self.film.blocks)
+        film_samples = self.samples * self.views.sum()
         self.mean = np.maximum(of_colours / film_samples, TINY).astype(np.float32)
         self.state = self._state(self.prior)
 
@@ -85,12 +106,64 @@ class ExplainedViews:
             step /= 2
         return False
 
+    def nearer_px(self) -> np.ndarray:
+        """By how many px of total disparity (L, h, w) sheets are nearer than the network says.
+
+        One step of Newton's method from its depths, as masks and textures stay (the one-step estimator of Le
+        Cam 1956): the slope of F over its curvature, the sum of the squared slopes of photons, in wide
+        windows of blocks where a sheet is seen. The network's depth counts by its error.
+        """
+        photons, film, (masks, _, _, textures, reach) = self.photons, self.film, self.state
+        L, h, w = masks.shape
+        gain = np.zeros((len(photons.blocks), L), np.float32)
+        move_photons(*photons[:3], reach[0], photons.moves, (masks.reshape(L, -1), textures), w, gain)
+        no_colour = np.zeros(len(gain), np.int8)
+        more, curvature, down, right = (np.zeros((L, 1, h * w), np.float32) for _ in range(4))
+        add_up(more, photons.blocks, no_colour, gain)
+        add_up(curvature, photons.blocks, no_colour, gain**2)
+        for moved, move in zip((down, right), film.moves, strict=True):
+            add_up(moved, film.blocks, film.colour, reach[1] * move[:, None])
+        more, curvature, down, right = (part.reshape(L, h, w) for part in (more, curvature, down, right))
+        seen, T = self._inner_blocks(), textures.reshape(-1, L + 1, h, w)
+
+        def of_sheet(sheet: int) -> np.ndarray:
+            weights = gaussian_weights(self.model.window_blocks, 3)
+            light = np.pad(np.tensordot(self.samples, T[:, sheet], axes=1), 1, mode="edge")
+            slopes = [np.gradient(light, axis=axis)[1:-1, 1:-1] for axis in (0, 1)]
+            moves = (gaussian_mean(part[sheet], weights) for part in (down, right))
+            less = sum(move * slope for move, slope in zip(moves, slopes, strict=True))
+            return self._newton_step(
+                seen[sheet] * (more[sheet] - masks[sheet] * less), seen[sheet] * curvature[sheet]
+            )
+
+        return np.stack(each_in_threads(of_sheet, range(L)))
+
+    def _inner_blocks(self) -> np.ndarray:
+        """Where sheets are what is seen (L, h, w) bool, so far from outlines that these say nothing of depth.
+
+        There masks are less exact and, of round things, depths: the rim is too near.
+        """
+        from scipy.ndimage import maximum_filter, minimum_filter
+
+        visible = self.sheets.visible(self.state.masks)
+        side = 2 * round(2 * self.model.window_blocks) + 1
+        sheet = np.where(visible.max(axis=0) > 0.5, visible.argmax(axis=0), -1)
+        is_inner = maximum_filter(sheet, side) == minimum_filter(sheet, side)
+        return is_inner & (sheet == np.arange(len(visible))[:, None, None])
+
+    def _newton_step(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+        model = self.model
+        blocks = np.float32(2 * np.pi * 4**model.wide_octave)
+        slope, curvature = (blocks * _wide_mean(part, model.wide_octave) for part in (slope, curvature))
+        return np.float32(model.depth_step) * slope / (curvature + np.float32(model.depth_error_px**-2))
+
     def _best_masks(self) -> np.ndarray:
         """The most probable masks (L, h, w) if all else stays as it is.
 
         The logit of each is that of the network, and what the photons around say, as the mean of a window:
-        each block as if all of its window were like it, but no more than `most_nats`. The mean is shrunk by
-        its noise, which is how much the blocks of the window differ (James and Stein 1961).
+        each block as if all of its window were like it, but no more than `most_nats`. Means are shrunk by the
+        share of noise in their squares (James and Stein 1961), both in a wide window; noise is how much the
+        blocks of a window differ.
         """
         model = self.model
         weights, nearest = gaussian_weights(model.window_blocks, 3), gaussian_weights(1.0, 3)
@@ -105,7 +178,8 @@ class ExplainedViews:
             noise = (gaussian_mean(nats**2, weights) - mean_nats**2).clip(0) / np.float32(
                 model.window_blocks**2
             )
-            odds = np.exp(mean_nats * (1 - noise / np.maximum(mean_nats**2, np.maximum(noise, TINY))))
+            noise, signal = (_wide_mean(part, model.wide_octave) for part in (noise, mean_nats**2))
+            odds = np.exp(mean_nats * (1 - noise / np.maximum(signal, np.maximum(noise, TINY))))
             odds *= prior / (1 - prior)
             return odds / (1 + odds)
 
@@ -116,27 +190,26 @@ class ExplainedViews:
         L, h, w = masks.shape
         Q, photons, film = self.samples.size, self.photons, self.film
         flat = masks.reshape(L, -1)
-        photon_reach, film_reach = (np.empty(rays.blocks.shape, np.float32) for rays in (photons, film))
+        photon_reach, film_reach = (np.zeros(rays.blocks.shape, np.float32) for rays in (photons, film))
         reach_sheets(photons.blocks, photons.order, flat, photon_reach)
         reach_sheets(film.blocks, film.order, flat, film_reach)
+        film_reach *= self.views[:, None]
         reached, exposure = np.zeros((L + 1, Q, h * w), np.float32), np.zeros((L + 1, 1, h * w), np.float32)
         add_up(reached, photons.blocks, photons.colour, photon_reach)
         add_up(exposure, film.blocks, film.colour, film_reach)
-        exposure *= np.float32(self.ray_views)
         T, photon_share = self._textures(
             masks, reached.reshape(L + 1, Q, h, w), exposure.reshape(L + 1, h, w)
         )
         of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons, photon_reach, of_sheets, gain))
-        samples = self.samples * np.float32(self.ray_views)
-        expected = sum(expect_photons(film.blocks, film.order, samples, film_reach, of_sheets, loss))
+        likelihood = sum(explain_photons(*photons[:3], photon_reach, of_sheets, gain))
+        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, of_sheets, loss))
         no_colour = np.zeros(len(gain), np.int8)
         more, less = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
         add_up(more, photons.blocks, no_colour, gain)
         add_up(less, film.blocks, film.colour, loss)
         slope = (more - less).reshape(masks.shape)
-        return State(masks, likelihood - expected, slope)
+        return State(masks, likelihood - expected, slope, of_sheets[1], (photon_reach, film_reach))
 
     def _textures(
         self, masks: np.ndarray, reached: np.ndarray, exposure: np.ndarray
@@ -158,22 +231,32 @@ class ExplainedViews:
         return T, photon_share
 
 
-def explain(
-    counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel
-) -> tuple[np.ndarray, np.ndarray]:
-    """Probabilities (L, h, w) that each sheet is what is seen, by the network alone and by the photons."""
+def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> Explanation:
+    """What the photons say of sheets: first of the masks, then of the depths."""
     views = ExplainedViews(counts, sheets, block_px, model)
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    return sheets.visible(views.prior), sheets.visible(views.state.masks)
+    return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks), views.nearer_px())
+
+
+def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
+    """Means (h, w) in windows of 2^octave blocks."""
+    shapes = list[tuple[int, ...]]()
+    for _ in range(octave):
+        shapes.append(values.shape)
+        values = block_sums(values, 2, np.float32) / 4
+    mean = gaussian_mean(values, gaussian_weights(1.0, 3))
+    for height, width in reversed(shapes):
+        mean = doubled(mean[None], height, width)[0]
+    return mean
 
 
 def _met(sheets: Sheets, rays: tuple[np.ndarray, ...], colour: np.ndarray) -> Rays:
     shape = rays[0].size, len(sheets.total_px) + 1
     blocks, order = np.empty(shape, np.int32), np.empty(shape, np.int8)
     meet_sheets(blocks, order, sheets.total_px, rays)
-    return Rays(blocks, order, colour)
+    return Rays(blocks, order, colour, (rays[2], rays[3]))
 
 
 def _photon_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
@@ -189,28 +272,29 @@ def _photon_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[
     return _rays(counts, (k, l), pixels, block_px), colour.astype(np.int8)
 
 
-def _film_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], float]:
-    """Rays of places evenly apart on the films of some cameras with photons, and how many views of a block
+def _film_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Rays of places evenly apart on the films of some cameras, and how many views (N,) float32 of a block
     each stands for.
 
-    The places differ from camera to camera, so that no blocks are left out.
+    Each of these cameras is the mean of some next to each other that have photons. Places differ from camera
+    to camera, so that no blocks are left out.
     """
     grid, side = counts.grid, FILM_BLOCKS * block_px
-    has_photons = (np.diff(counts.view_starts) > 0).reshape(grid.rows, grid.cols)
-    cameras = [
-        (k, l, (row + 2 * (col % 2)) % 4, (col + 2 * (row % 2)) % 4)
-        for row, k in enumerate(evenly_chosen(grid.rows, most))
-        for col, l in enumerate(evenly_chosen(grid.cols, most))
-        if has_photons[k, l]
-    ] or [(k, l, 1.5, 1.5) for k, l in np.argwhere(has_photons)[:1]]
+    cells = np.argwhere((np.diff(counts.view_starts) > 0).reshape(grid.rows, grid.cols))
+    cameras = list[tuple[float, ...]]()
+    for row, of_row in enumerate(np.array_split(np.arange(grid.rows), min(most, grid.rows))):
+        for col, of_col in enumerate(np.array_split(np.arange(grid.cols), min(most, grid.cols))):
+            near = cells[np.isin(cells[:, 0], of_row) & np.isin(cells[:, 1], of_col)]
+            if near.size:
+                place = (row + 2 * (col % 2)) % 4, (col + 2 * (row % 2)) % 4
+                cameras.append((*near.mean(axis=0), *place, len(near)))
     rows, cols = np.arange(0, grid.height, side), np.arange(0, grid.width, side)
-    views, film_shape = len(cameras), (len(rows), len(cols))
-    k, l, down, right = (np.array(part)[:, None, None] for part in zip(*cameras, strict=True))
+    film_shape = len(cameras), len(rows), len(cols)
+    k, l, down, right, views = (np.array(part)[:, None, None] for part in zip(*cameras, strict=True))
     i = rows[:, None] + (down + 0.5) * side / 4
     j = cols + (right + 0.5) * side / 4
-    places = (np.broadcast_to(part, (views, *film_shape)).ravel() for part in (k, l, i, j))
-    k, l, i, j = places
-    return _rays(counts, (k, l), (i, j), block_px), has_photons.sum() / views * FILM_BLOCKS**2
+    k, l, i, j, views = (np.broadcast_to(part, film_shape).ravel() for part in (k, l, i, j, views))
+    return _rays(counts, (k, l), (i, j), block_px), views.astype(np.float32) * FILM_BLOCKS**2
 
 
 def _rays(

@@ -1,4 +1,5 @@
-"""Depth and masks from one posterior probability: evidence of texture, smooth surfaces, and a network.
+"""Depth and masks from one posterior probability: evidence of texture, smooth surfaces, a network, and, of
+photon counts, sheets that explain what all cameras see.
 
 Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
 largest value. So a connected region that may be a surface, at any plane, has an answer if a depth is shown in
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
-from pcii.depth.sheets import SheetModel, cut_sheets, in_focus_after
+from pcii.depth.sheets import SheetModel, cut_sheets
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
@@ -132,34 +133,37 @@ class PosteriorDepth:
         nowhere = np.zeros(nothing[0].shape, bool)
         posterior = DepthPosterior(planes, *maps, nowhere, nowhere, hot_pixels=replaced)
         plane, _, total_px = posterior.most_probable()
-        if isinstance(data, PhotonCounts) and z_mm.size:
-            in_focus = self._explained_focus(data, posterior, total_px, z_mm)
         is_inside = _is_between(total_px, answered_px)
         is_possible = self._has_photons(network.photons, plane, block_px)
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
             is_possible &= posterior.no_surface <= self.max_empty
-        total_px = on_pixels(total_px, block_px, data.grid.shape_HW)
+        on_film_px = on_pixels(total_px, block_px, data.grid.shape_HW)
         side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
-        depth = _nearest(coarse.planes, total_px[::side_px, ::side_px])
+        depth = _nearest(coarse.planes, on_film_px[::side_px, ::side_px])
         shown, supported = (
             on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
             for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
         )
         is_detected = is_inside & self._detected(is_possible, shown & is_inside)
-        in_focus = in_focus[order]
-        return replace(posterior, in_focus=in_focus, is_detected=is_detected, is_supported=supported)
+        posterior = replace(posterior, is_detected=is_detected, is_supported=supported)
+        if isinstance(data, PhotonCounts):
+            posterior = self._explained(data, posterior, total_px, z_mm)
+        return replace(posterior, in_focus=posterior.in_focus[order])
 
-    def _explained_focus(
+    def _explained(
         self, counts: PhotonCounts, posterior: DepthPosterior, total_px: np.ndarray, z_mm: np.ndarray
-    ) -> np.ndarray:
-        """The probability (R, h, w) of being in focus, after sheets explain the photons of all cameras."""
+    ) -> DepthPosterior:
+        """The posterior, whose most probable depths are `total_px`, after sheets explain the photons of all
+        cameras."""
         from pcii.depth.explained_views import explain
+        from pcii.depth.posterior_of_sheets import posterior_after
 
-        sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), self.sheets)
-        if not sheets.probability.any():
-            return posterior.in_focus
-        before, after = explain(counts, sheets, posterior.block_px, self.sheets)
-        return in_focus_after(posterior.in_focus, sheets, before, after, self.sheets.least)
+        model = self.sheets
+        sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), model)
+        if model.sweeps == 0 or not sheets.probability.any():
+            return posterior
+        explained = explain(counts, sheets, posterior.block_px, model)
+        return posterior_after(posterior, sheets, explained, model.least)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.

@@ -124,7 +124,8 @@ def expect_photons(
     state: tuple[np.ndarray, ...],
     loss: np.ndarray,
 ) -> float:
-    """The expected number of photons of rays, each with `samples` (Q,) float32.
+    """The expected number of photons of rays, each with `samples` (Q,) float32 times the views that it stands
+    for, which `reach` is multiplied by.
 
     Fills `loss` (N, L), by how much it grows with the mask of each sheet.
     """
@@ -148,8 +149,51 @@ def expect_photons(
                 behind[q] += m[sheet, block] * difference
             loss[ray, sheet] = reach[ray, sheet] * more
         for q in range(samples.size):
-            total += samples[q] * behind[q]
+            total += reach[ray, order[ray, 0]] * samples[q] * behind[q]
     return total
+
+
+@helper
+def _slope(texture: np.ndarray, block: int, w: int, a: float, b: float) -> float:
+    """By how much a texture (n,) grows at a block as the ray moves by (a, b) blocks; w blocks are a row."""
+    row, column = block - block % w, block % w
+    above, below = max(block - w, column), min(block + w, texture.size - w + column)
+    left, right = row + max(column - 1, 0), row + min(column + 1, w - 1)
+    return (a * (texture[below] - texture[above]) + b * (texture[right] - texture[left])) / 2
+
+
+@shared(lambda blocks, *_: len(blocks))
+def move_photons(
+    first: int,
+    last: int,
+    blocks: np.ndarray,
+    order: np.ndarray,
+    colour: np.ndarray,
+    reach: np.ndarray,
+    moves: tuple[np.ndarray, np.ndarray],
+    state: tuple[np.ndarray, ...],
+    w: int,
+    gain: np.ndarray,
+) -> None:
+    """Fill `gain` (N, L), by how much the log q of a photon grows with each px that a sheet is nearer.
+
+    Rays move by (a, b), and `state` is m and T.
+    """
+    m, T = state
+    a, b = moves
+    L = len(m)
+    for ray in range(first, last):
+        texture, place = T[colour[ray]], 0
+        q = reach[ray, L] * texture[L, blocks[ray, L]]
+        while order[ray, place] < L:
+            sheet = order[ray, place]
+            block = blocks[ray, sheet]
+            visible = reach[ray, sheet] * m[sheet, block]
+            q += visible * texture[sheet, block]
+            gain[ray, sheet] = visible * _slope(texture[sheet], block, w, a[ray], b[ray])
+            place += 1
+        for met in range(place):
+            gain[ray, order[ray, met]] /= q
 
 
 @shared(lambda sums, *_: len(sums))
@@ -208,6 +252,17 @@ def mix_levels(
     return texture, own
 
 
+@helper
+def _nearest_sheet(total_px: np.ndarray, i: int, j: int, plane_px: float, near_px: float) -> int:
+    """The sheet of total_px (L, h, w) nearest to a plane at a block; L if none is nearer than `near_px`."""
+    nearest, distance = len(total_px), np.float32(near_px)
+    for sheet in range(len(total_px)):
+        away = abs(total_px[sheet, i, j] - plane_px)
+        if away < distance:
+            nearest, distance = sheet, away
+    return nearest
+
+
 @shared(lambda probability, *_: probability.shape[1])
 def share_planes(
     first: int,
@@ -222,10 +277,48 @@ def share_planes(
     for i in range(first, last):
         for z in range(len(planes)):
             for j in range(probability.shape[2]):
-                nearest, distance = -1, np.float32(near_px)
-                for sheet in range(len(total_px)):
-                    away = abs(total_px[sheet, i, j] - planes_px[z])
-                    if away < distance:
-                        nearest, distance = sheet, away
-                if nearest >= 0:
+                nearest = _nearest_sheet(total_px, i, j, planes_px[z], near_px)
+                if nearest < len(total_px):
                     probability[nearest, i, j] += planes[z, i, j]
+
+
+@shared(lambda probability, *_: probability.shape[1])
+def move_planes(
+    first: int,
+    last: int,
+    probability: np.ndarray,
+    no_surface: np.ndarray,
+    before: tuple[np.ndarray, np.ndarray],
+    planes_px: np.ndarray,
+    total_px: np.ndarray,
+    near_px: float,
+    change: tuple[np.ndarray, np.ndarray],
+) -> None:
+    """Add to the `probability` (Z, h, w) of planes, and fill `no_surface` (h, w), from those `before`.
+
+    `change` is by how many planes (L, h, w) sheets move, and how many times more (L + 1, h, w) they are seen,
+    and the light without depth is: planes near a sheet move with it.
+    """
+    old, nothing = before
+    moves, growth = change
+    Z, _, w = old.shape
+    L = len(total_px)
+    for i in range(first, last):
+        for j in range(w):
+            no_surface[i, j] = nothing[i, j] * growth[L, i, j]
+        total = no_surface[i].copy()
+        for z in range(Z):
+            for j in range(w):
+                nearest = _nearest_sheet(total_px, i, j, planes_px[z], near_px)
+                place = np.float32(z)
+                if nearest < L:
+                    place = min(max(place + moves[nearest, i, j], np.float32(0)), np.float32(Z - 1))
+                plane = int(place)
+                mass = old[z, i, j] * growth[nearest, i, j]
+                beyond = mass * (place - plane)
+                probability[plane, i, j] += mass - beyond
+                probability[min(plane + 1, Z - 1), i, j] += beyond
+                total[j] += mass
+        for j in range(w):
+            no_surface[i, j] /= total[j]
+            probability[:, i, j] /= total[j]

@@ -45,13 +45,24 @@ class SheetModel:
     network decides."""
     most_photons: int = 1 << 20
     """Of more, as many are chosen at random: the time that a sweep takes at most."""
-    cameras: int = 4
-    """Along either axis, of which it is computed what they see of each block."""
+    cameras: int = 7
+    """Along either axis, each the mean of some next to each other, of which it is computed what they see of
+    a block. With fewer, what outlines hide is less exact; with more, sweeps take longer."""
     sweeps: int = 6
-    """At most, as long as the objective rises; with none masks are the network's own."""
+    """At most, as long as the objective rises; with none the network decides alone."""
     step: float = 0.8
     """Share of the way to the best masks in a sweep. If it is larger, sheets swap places; if smaller, more
     sweeps are needed."""
+    wide_octave: int = 4
+    """In windows of 2 to this power blocks sheets move in depth, and the share of noise in the evidence is
+    computed. If it is larger, bent things move as one; if smaller, noise decides, and plain walls stay
+    where they are."""
+    depth_error_px: float = 1.0
+    """Standard deviation of the error of the network's depth in such a window. If it is larger, the photons
+    decide in less light, with more noise; if smaller, the network does."""
+    depth_step: float = 0.5
+    """Share of the way to the best depths. Textures are blurred where depths are wrong, so that their slopes
+    are too small and all of the way is too far; if it is smaller, depths stay where they are."""
 
 
 class Sheets(NamedTuple):
@@ -120,35 +131,6 @@ def cut_sheets(
     np.maximum(probability, claimed, out=probability)
     probability /= np.maximum(probability.sum(axis=0), 1)
     return Sheets(total, same_px, probability, is_at, np.argsort(-total, axis=0))
-
-
-def in_focus_after(
-    in_focus: np.ndarray, sheets: Sheets, before: np.ndarray, after: np.ndarray, least: float
-) -> np.ndarray:
-    """The probability (R, h, w) of being in focus at requested planes, after sheets that were seen with the
-    probabilities `before` (L, h, w) are seen with those `after`.
-
-    It grows by as much as the sheets at the plane do, each together with those at the same depth, and that of
-    no plane by as much as the others and the light without depth. Where nothing changes it does not either.
-    """
-    old, new = (
-        np.concatenate([_with_near(sheets, visible), 1 - visible.sum(axis=0, keepdims=True)])
-        + np.float32(least)
-        for visible in (before, after)
-    )
-    weight = np.concatenate([before, 1 - before.sum(axis=0, keepdims=True)]) + np.finfo(np.float32).eps
-    of_none = np.append(~sheets.is_at.any(axis=0), True)
-    rows = [np.append(own, False) for own in sheets.is_at] + [of_none]
-    claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
-    for probability, own in zip(claimed, rows, strict=True):
-        probability *= (weight[own] * new[own] / old[own]).sum(axis=0) / weight[own].sum(axis=0)
-    return claimed[:-1] / claimed.sum(axis=0)
-
-
-def _with_near(sheets: Sheets, visible: np.ndarray) -> np.ndarray:
-    """The probability (L, h, w) that a sheet, or another at its depth, is what is seen."""
-    depths, same_px = sheets.total_px, sheets.same_px
-    return np.stack([(visible * (np.abs(depths - own) < same_px)).sum(axis=0) for own in depths])
 
 
 def _smooth_parts(

@@ -3,8 +3,9 @@ import pytest
 from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
-from pcii.depth.explained_views import ExplainedViews, explain
-from pcii.depth.sheets import SheetModel, Sheets, cut_sheets, in_focus_after
+from pcii.depth.explained_views import ExplainedViews, Explanation
+from pcii.depth.posterior_of_sheets import posterior_after
+from pcii.depth.sheets import SheetModel, Sheets, cut_sheets
 from pcii.types.estimates import DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
@@ -76,13 +77,54 @@ def test_sweeps_find_the_bars_and_never_lower_the_objective(photons_per_px: floa
     assert (found == shown)[is_sure].mean() > least
 
 
-def test_where_photons_say_nothing_the_network_stays() -> None:
+@pytest.mark.parametrize(("error_px", "most_px"), [(-0.8, 0.3), (0.0, 0.15), (0.8, 0.3)])
+def test_sheets_move_to_their_true_depth(error_px: float, most_px: float) -> None:
     shown = bars()
     sheets = sheets_of(shown)
-    in_focus = np.random.default_rng(0).random((2, SIDE, SIDE)).astype(np.float32) / 2
-    counts = draw(1.0, 0, shown)
-    before, after = explain(counts, sheets, 1, SheetModel(sweeps=0))
-    np.testing.assert_allclose(in_focus_after(in_focus, sheets, before, after, 0.02), in_focus, atol=1e-5)
+    off = sheets._replace(total_px=sheets.total_px + np.float32(error_px))
+    seen, moves = np.stack([shown, ~shown]), np.zeros(2)
+    for seed in range(4):
+        # In windows of 1 block bars have blocks that are 2 windows from outlines.
+        views = ExplainedViews(draw(2.0, seed, shown), off, 1, SheetModel(window_blocks=1.0))
+        nearer_px = views.nearer_px()
+        moves += [nearer_px[sheet][seen[sheet]].mean() / 4 for sheet in range(2)]
+    assert np.abs(moves + error_px).max() < most_px
+
+
+def posterior_of(
+    planes: np.ndarray, planes_px: np.ndarray, requested: int, supported: bool
+) -> DepthPosterior:
+    """A posterior of planes (Z, h, w) of known surfaces, the same for each requested plane."""
+    of_grid = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
+    nowhere, is_supported = np.zeros((SIDE, SIDE), bool), np.full((SIDE, SIDE), supported)
+    in_focus = np.full((requested, SIDE, SIDE), 0.9 / max(requested, 1), np.float32)
+    nothing = np.asarray(1 - planes.sum(axis=0), np.float32)
+    return DepthPosterior(of_grid, planes, nothing, 1, in_focus, nowhere, is_supported)
+
+
+@pytest.mark.parametrize("supported", [False, True])
+def test_a_posterior_follows_its_sheets_where_photons_tell_the_depth(supported: bool) -> None:
+    planes_px = np.arange(2.0, 26.0)
+    far, near = (np.abs(planes_px - 4 * step) < 1.5 for step in (FAR_STEP, NEAR_STEP))
+    one = (0.2 * far + 0.1 * near).astype(np.float32)  # and .1 of no surface
+    posterior = posterior_of(
+        np.tile(one[:, None, None], (1, SIDE, SIDE)), planes_px, requested=2, supported=supported
+    )
+    sheets = sheets_of(bars())
+    before = np.stack([np.full((SIDE, SIDE), share, np.float32) for share in (0.3, 0.6)])
+    same = posterior_after(posterior, sheets, Explanation(before, before, 0 * before), 0.02)
+    np.testing.assert_allclose(same.probability, posterior.probability, atol=1e-6)
+    np.testing.assert_allclose(same.in_focus, posterior.in_focus, atol=1e-6)
+    after = before[::-1]
+    moved = posterior_after(posterior, sheets, Explanation(before, after, 0 * before + 0.25), 0.0)
+    np.testing.assert_allclose(moved.probability.sum(axis=0) + moved.no_surface, 1, atol=1e-5)
+    np.testing.assert_allclose(moved.in_focus[0] / moved.in_focus[1], 4, rtol=1e-4)
+    share = moved.probability[:, 9, 9]
+    is_near = planes_px > 14
+    mean_px = [np.average(planes_px[part], weights=share[part]) for part in (~is_near, is_near)]
+    shift = 0.25 if supported else 0
+    assert mean_px == pytest.approx([8 + shift, 20 + shift], abs=1e-3)
+    assert share[is_near].sum() == pytest.approx(0.6 if supported else 0.3, abs=1e-3)
 
 
 def test_sheets_are_the_connected_parts_of_smooth_depth_and_requested_planes() -> None:
@@ -93,10 +135,7 @@ def test_sheets_are_the_connected_parts_of_smooth_depth_and_requested_planes() -
     depth_px[30:, 30:] = 20.0
     near = np.abs(depth_px - planes_px[:, None, None])
     planes = np.maximum(1 - near, 0).astype(np.float32)
-    film, nowhere = (SIDE, SIDE), np.zeros((SIDE, SIDE), bool)
-    of_grid = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
-    no_surface, in_focus = np.zeros(film, np.float32), np.zeros((2, *film), np.float32)
-    posterior = DepthPosterior(of_grid, planes, no_surface, 1, in_focus, nowhere, nowhere)
+    posterior = posterior_of(planes, planes_px, requested=2, supported=True)
     sheets = cut_sheets(posterior, depth_px, np.array([20.5, 15.0]), SheetModel())
     middle_px = np.median(sheets.total_px, axis=(1, 2))
     assert len(middle_px) == 3
