@@ -13,9 +13,9 @@ from pcii.types.estimates import DepthPosterior
 def posterior_after(
     posterior: DepthPosterior, sheets: Sheets, explained: Explanation, least: float
 ) -> DepthPosterior:
-    """The posterior whose planes near a sheet move with it, and grow by as much as it is seen more.
+    """The posterior whose planes near a sheet move with it, and grow by the root of how much more it is seen.
 
-    No surface and planes far from all sheets grow by as much as the light without depth is. Where the photons
+    So do no surface and planes far from all sheets with the light without depth. Where the photons
     around do not tell the depth the network's stays. The probability of being in focus at a requested plane
     grows by as much as the sheets at the plane do, that of no plane by as much as the others and the light
     without depth. Where nothing changes the posterior does not either.
@@ -26,7 +26,8 @@ def posterior_after(
     probability, no_surface = np.zeros_like(posterior.probability), np.empty_like(posterior.no_surface)
     planes_px = posterior.planes.total_disparity_px
     step_px = np.ptp(planes_px) / max(len(planes_px) - 1, 1) or 1.0
-    change = explained.nearer_px / np.float32(step_px), growth
+    # The network's planes know the same photons already, so that what sheets say of them counts half.
+    change = explained.nearer_px / np.float32(step_px), np.sqrt(growth)
     old = posterior.probability, posterior.no_surface
     move_planes(probability, no_surface, old, planes_px, sheets.total_px, sheets.same_px, change)
     is_supported = posterior.is_supported
