@@ -139,17 +139,18 @@ class ExplainedViews:
         return np.stack(each_in_threads(of_sheet, range(L)))
 
     def _inner_blocks(self) -> np.ndarray:
-        """Where sheets are what is seen (L, h, w) bool, so far from outlines that these say nothing of depth.
+        """Where network and photons agree on the sheet that is seen (L, h, w) bool, so far from outlines that
+        these say nothing of depth.
 
-        There masks are less exact and, of round things, depths: the rim is too near.
+        There masks are less exact and, of round things, depths: the rim is too near. Plain dark light around
+        a thing may be of its sheet for all that photons say; then its outline is within the sheet.
         """
         from scipy.ndimage import maximum_filter, minimum_filter
 
-        visible = self.sheets.visible(self.state.masks)
-        side = 2 * round(2 * self.model.window_blocks) + 1
-        sheet = np.where(visible.max(axis=0) > 0.5, visible.argmax(axis=0), -1)
-        is_inner = maximum_filter(sheet, side) == minimum_filter(sheet, side)
-        return is_inner & (sheet == np.arange(len(visible))[:, None, None])
+        masks, side = self.state.masks, 2 * round(2 * self.model.window_blocks) + 1
+        of_network, sheet = (_seen_sheet(self.sheets.visible(each)) for each in (self.prior, masks))
+        is_inner = (maximum_filter(sheet, side) == minimum_filter(sheet, side)) & (sheet == of_network)
+        return is_inner & (sheet == np.arange(len(masks))[:, None, None])
 
     def _newton_step(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         model = self.model
@@ -238,6 +239,11 @@ def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetMod
         if not views.sweep():
             break
     return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks), views.nearer_px())
+
+
+def _seen_sheet(visible: np.ndarray) -> np.ndarray:
+    """The number (h, w) of the sheet that is more probably seen than not, -1 where none is."""
+    return np.where(visible.max(axis=0) > 0.5, visible.argmax(axis=0), -1)
 
 
 def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
