@@ -1,58 +1,88 @@
-"""What the constants of depth by the posterior change: each alone is halved and doubled, on datasets.
+"""What the constants of depth and masks change: each alone is halved and doubled, on datasets.
 
-For each amount of light the table has two means over the datasets: the share of the objects' pixels whose
-depth is off by more than 1 px of total disparity, or missing, of which less is better, and the quadratic
-score of the confidence, of which more is better.
+For each amount of light the table has three means over the datasets, of which more is better: the IoU of the
+masks at the planes that show objects, the share of the objects' pixels whose depth is right to 1 px of total
+disparity, and the quadratic score of the confidence.
 """
 
 import argparse
 import sys
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import pcii
 from pcii.base.progress import Stages
-from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.evaluation.method_names import depth_name
+from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
+from pcii.evaluation.comparison import find_datasets
 from pcii.evaluation.tables import Table, light_name, markdown
+from pcii.removal.posterior_masks import masks_of
+from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.types.photon_limit import FULL_LIGHT, Light
+
+PARTS = "model", "prior", "shown", "sheets", "search"
+"""Of `PosteriorDepth`: those that have constants of their own, and its own constants."""
 
 
 def main() -> int:
     """Run the command line; gives the exit code, 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.depth_constants", description=__doc__)
     parser.add_argument("folders", nargs="+", metavar="FOLDER", help="a dataset, or a collection of them")
-    parser.add_argument("--budget", action="append", default=[], help="photons, or full-light (default: all)")
-    options, methods = parser.parse_args(), dict(variants())
-    functions = [(depth_name(name), method) for name, method in methods.items()]
+    parser.add_argument("--budget", action="append", help="photons per view (default: all of each dataset)")
+    parser.add_argument("--part", action="append", choices=PARTS, help="its constants alone (default: all)")
+    options = parser.parse_args()
+    methods = dict(variants(options.part or PARTS))
     try:
-        with tempfile.TemporaryDirectory() as folder, Stages() as report:
-            folders, budgets, out = options.folders, options.budget, Path(folder) / "scores"
-            evaluation = pcii.evaluate(folders, out, methods=functions, budgets=budgets, report=report)
+        chosen = [Light.parse(budget) for budget in options.budget or ()]
+        datasets = [pcii.open_dataset(folder) for folder in find_datasets(options.folders)]
+        lit = [
+            (dataset, light)
+            for dataset in datasets
+            for light in chosen or dataset.lights
+            if light != FULL_LIGHT
+        ]
+        found: dict[tuple[str, str], list[tuple[float, ...]]] = {}
+        with Stages() as report:
+            for number, (dataset, light) in enumerate(lit):
+                data = dataset.at_light(light)
+                for done, (name, method) in enumerate(methods.items(), start=1):
+                    found.setdefault((name, str(light)), []).append(_scores(data, method))
+                    report("constants", number * len(methods) + done, len(lit) * len(methods))
     except pcii.InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2
-    groups: Any = evaluation.frame.groupby(["method", "light"], observed=True)
-    cells = groups[["within_1px", "quadratic_score"]].mean()
-    cells["text"] = [f"{1 - within:.3f}, {score:.3f}" for within, score in cells.to_numpy()]
-    texts = cells["text"].unstack("light")
-    rows = [(name, *texts.loc[depth_name(name)]) for name in methods]
-    print(markdown(Table("", ("constant", *map(light_name, texts.columns)), tuple(rows))))
+
+    def cell(name: str, light: str) -> str:
+        return ", ".join(f"{mean:.3f}" for mean in np.mean(found[name, light], axis=0))
+
+    lights = list(dict.fromkeys(str(light) for _, light in lit))
+    rows = [(name, *(cell(name, light) for light in lights)) for name in methods]
+    print(markdown(Table("", ("constant", *map(light_name, lights)), tuple(rows))))
     return 0
 
 
-def variants() -> Iterator[tuple[str, PosteriorDepth]]:
-    """The method as it is, and with each of its numbers halved and doubled."""
+def variants(parts: Sequence[str]) -> Iterator[tuple[str, PosteriorDepth]]:
+    """The method as it is, and with each number of its parts halved and doubled."""
     default = PosteriorDepth()
     yield "as it is", default
-    for part in ("model", "prior", "shown", None):
-        owner: Any = getattr(default, part) if part else default
+    for part in parts:
+        owner: Any = getattr(default, part, default)
         for name, value in vars(owner).items():
             for factor in (0.5, 2) if isinstance(value, int | float) else ():
                 changed = replace(owner, **{name: type(value)(factor * value)})
-                yield f"{name} = {factor * value:g}", replace(default, **{part: changed}) if part else changed
+                method = changed if owner is default else replace(default, **{part: changed})
+                yield f"{name} = {factor * value:g}", method
+
+
+def _scores(data: pcii.Dataset, method: PosteriorDepth) -> tuple[float, ...]:
+    z_range_mm, planes = depth_range_of(data), planes_of(data)
+    posterior = method.posterior(data.counts, z_range_mm, planes.z_mm)
+    masks = masks_of(posterior, pcii.reconstruct(data.counts, planes))
+    score = pcii.score(masks, depth_map_of(posterior, z_range_mm), data.truth)
+    iou = [plane["iou"] for plane in score.planes if plane["truth"] == "object"]
+    return float(np.mean(iou)), score.depth["within_1px"], score.depth["quadratic_score"]
 
 
 if __name__ == "__main__":

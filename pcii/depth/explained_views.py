@@ -38,8 +38,6 @@ FILM_BLOCKS = 2
 """Distance in blocks between the places of a film for which expected photons are computed. If it is larger,
 sweeps are faster and expected numbers less exact."""
 TINY = np.finfo(np.float32).tiny
-HALVINGS = 2
-"""How often a step that lowers the objective is halved before the masks stay as they are."""
 
 
 class Rays(NamedTuple):
@@ -95,48 +93,50 @@ class ExplainedViews:
         return self.state.objective
 
     def sweep(self) -> bool:
-        """Masks one step better; False where no step is found that does not lower F."""
-        masks, best = self.state.masks, self._best_masks()
+        """Masks one step better; False where that would lower F, and they stay."""
         step = np.float32(self.model.step)
-        for _ in range(HALVINGS + 1):
-            state = self._state((1 - step) * masks + step * best)
-            if state.objective >= self.state.objective:
-                self.state = state
-                return True
-            step /= 2
-        return False
+        state = self._state((1 - step) * self.state.masks + step * self._best_masks())
+        is_better = state.objective >= self.state.objective
+        if is_better:
+            self.state = state
+        return is_better
 
     def nearer_px(self) -> np.ndarray:
         """By how many px of total disparity (L, h, w) sheets are nearer than the network says.
 
         One step of Newton's method from its depths, as masks and textures stay (the one-step estimator of Le
         Cam 1956): the slope of F over its curvature, the sum of the squared slopes of photons, in wide
-        windows of blocks where a sheet is seen. The network's depth counts by its error.
+        windows of blocks where a sheet is seen. The network's depth counts by its error. Only differences
+        between cameras that see the same block count, so that errors of its brightness do not (Neyman 1959).
         """
-        photons, film, (masks, _, _, textures, reach) = self.photons, self.film, self.state
+        photons, (masks, _, _, textures, reach) = self.photons, self.state
         L, h, w = masks.shape
-        gain = np.zeros((len(photons.blocks), L), np.float32)
-        move_photons(*photons[:3], reach[0], photons.moves, (masks.reshape(L, -1), textures), w, gain)
+        gain, of_sheets = np.zeros((len(photons.blocks), L), np.float32), (masks.reshape(L, -1), textures)
+        moves = photons.moves, self._mean_moves()
+        move_photons(*photons[:3], reach[0], moves, of_sheets, w, gain)
         no_colour = np.zeros(len(gain), np.int8)
-        more, curvature, down, right = (np.zeros((L, 1, h * w), np.float32) for _ in range(4))
-        add_up(more, photons.blocks, no_colour, gain)
+        slope, curvature = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
+        add_up(slope, photons.blocks, no_colour, gain)
         add_up(curvature, photons.blocks, no_colour, gain**2)
-        for moved, move in zip((down, right), film.moves, strict=True):
-            add_up(moved, film.blocks, film.colour, reach[1] * move[:, None])
-        more, curvature, down, right = (part.reshape(L, h, w) for part in (more, curvature, down, right))
-        seen, T = self._inner_blocks(), textures.reshape(-1, L + 1, h, w)
+        seen = self._inner_blocks()
+        of_blocks = (seen * part.reshape(L, h, w) for part in (slope, curvature))
+        steps = each_in_threads(lambda parts: self._newton_step(*parts), list(zip(*of_blocks, strict=True)))
+        return np.stack(steps)
 
-        def of_sheet(sheet: int) -> np.ndarray:
-            weights = gaussian_weights(self.model.window_blocks, 3)
-            light = np.pad(np.tensordot(self.samples, T[:, sheet], axes=1), 1, mode="edge")
-            slopes = [np.gradient(light, axis=axis)[1:-1, 1:-1] for axis in (0, 1)]
-            moves = (gaussian_mean(part[sheet], weights) for part in (down, right))
-            less = sum(move * slope for move, slope in zip(moves, slopes, strict=True))
-            return self._newton_step(
-                seen[sheet] * (more[sheet] - masks[sheet] * less), seen[sheet] * curvature[sheet]
-            )
+    def _mean_moves(self) -> tuple[np.ndarray, np.ndarray]:
+        """The mean moves (L, h w) of the rays that reach a sheet in the blocks around, down and right."""
+        film, reach = self.film, self.state.reach[1]
+        shape = self.prior.shape
+        weights = gaussian_weights(self.model.window_blocks, 3)
 
-        return np.stack(each_in_threads(of_sheet, range(L)))
+        def around(values: np.ndarray) -> np.ndarray:
+            sums = np.zeros((shape[0], 1, shape[1] * shape[2]), np.float32)
+            add_up(sums, film.blocks, film.colour, values)
+            return np.stack([gaussian_mean(part, weights) for part in sums.reshape(shape)])
+
+        views = around(reach) + TINY
+        down, right = ((around(reach * move[:, None]) / views).reshape(shape[0], -1) for move in film.moves)
+        return down, right
 
     def _inner_blocks(self) -> np.ndarray:
         """Where network and photons agree on the sheet that is seen (L, h, w) bool, so far from outlines that

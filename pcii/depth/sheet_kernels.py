@@ -170,17 +170,18 @@ def move_photons(
     order: np.ndarray,
     colour: np.ndarray,
     reach: np.ndarray,
-    moves: tuple[np.ndarray, np.ndarray],
+    moves: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     state: tuple[np.ndarray, ...],
     w: int,
     gain: np.ndarray,
 ) -> None:
     """Fill `gain` (N, L), by how much the log q of a photon grows with each px that a sheet is nearer.
 
-    Rays move by (a, b), and `state` is m and T.
+    `moves` are the (a, b) of the rays and those of the mean of all rays that meet a block (L, n), from which
+    they are counted; `state` is m and T.
     """
     m, T = state
-    a, b = moves
+    (a, b), (mean_a, mean_b) = moves
     L = len(m)
     for ray in range(first, last):
         texture, place = T[colour[ray]], 0
@@ -190,7 +191,8 @@ def move_photons(
             block = blocks[ray, sheet]
             visible = reach[ray, sheet] * m[sheet, block]
             q += visible * texture[sheet, block]
-            gain[ray, sheet] = visible * _slope(texture[sheet], block, w, a[ray], b[ray])
+            down, right = a[ray] - mean_a[sheet, block], b[ray] - mean_b[sheet, block]
+            gain[ray, sheet] = visible * _slope(texture[sheet], block, w, down, right)
             place += 1
         for met in range(place):
             gain[ray, order[ray, met]] /= q

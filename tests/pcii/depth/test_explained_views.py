@@ -5,6 +5,7 @@ from twins import unit_grid
 
 from pcii.depth.explained_views import ExplainedViews, Explanation
 from pcii.depth.posterior_of_sheets import posterior_after
+from pcii.depth.sheet_kernels import expect_photons, reach_sheets
 from pcii.depth.sheets import SheetModel, Sheets, cut_sheets
 from pcii.types.estimates import DepthPosterior
 from pcii.types.focal_planes import FocalPlanes
@@ -89,6 +90,53 @@ def test_sheets_move_to_their_true_depth(error_px: float, most_px: float) -> Non
         nearer_px = views.nearer_px()
         moves += [nearer_px[sheet][seen[sheet]].mean() / 4 for sheet in range(2)]
     assert np.abs(moves + error_px).max() < most_px
+
+
+@pytest.mark.parametrize("slope_px", [-0.15, 0.0, 0.15])
+def test_a_sheet_whose_light_fades_stays_where_it_is(slope_px: float) -> None:
+    # Cameras on one side see more of a tilted sheet, and one side alone what is near an end of the film.
+    side = 96
+    grid, px = unit_grid(CAMERAS, CAMERAS, side, side), np.arange(side) + 0.5
+    rate = np.empty(grid.shape_KLHW)
+    for k, l in np.ndindex(CAMERAS, CAMERAS):
+        away = (k - 2) / 4  # blocks by which rays of this row of cameras move with each px of disparity
+        row = (px + away * (12 - slope_px * side / 2)) / (1 - away * slope_px)
+        rate[k, l] = np.exp(-row / 24)[:, None]
+    total = np.broadcast_to(12 + slope_px * (px - side / 2)[:, None], (1, side, side)).astype(np.float32)
+    one, model = np.ones(total.shape, np.float32), SheetModel(depth_step=1.0)
+    sheets = Sheets(total, 2.5, one, np.ones((1, 1), bool), np.zeros(total.shape, int))
+    moves = list[float]()
+    for seed in range(4):
+        counts = PhotonCounts.from_dense(np.random.default_rng(seed).poisson(2.0 * rate), grid)
+        moves.append(ExplainedViews(counts, sheets, 1, model).nearer_px()[0, 12:-12, 12:-12].mean())
+    assert abs(np.mean(moves)) < 0.6
+
+
+def test_a_mask_costs_the_photons_that_it_adds_to_what_is_expected() -> None:
+    random = np.random.default_rng(3)
+    sheets, rays, blocks, colours = 3, 200, 12, 2
+    met = random.integers(-1, blocks, (rays, sheets + 1)).astype(np.int32)
+    met[:, sheets] = np.abs(met[:, sheets])
+    order = np.full((rays, sheets + 1), sheets, np.int8)
+    for ray in range(rays):
+        own = random.permutation(np.flatnonzero(met[ray, :sheets] >= 0))
+        order[ray, : own.size] = own
+    samples = np.array([0.5, 2.0], np.float32)
+    textures = random.uniform(0.1, 3, (colours, sheets + 1, blocks)).astype(np.float32)
+
+    def expected(masks: np.ndarray) -> tuple[float, np.ndarray]:
+        reach, loss = (np.zeros((rays, count), np.float32) for count in (sheets + 1, sheets))
+        reach_sheets(met, order, masks, reach)
+        of_sheets = masks, textures, np.zeros_like(textures[:, :sheets])
+        return sum(expect_photons(met, order, samples, reach, of_sheets, loss)), loss
+
+    masks = random.uniform(0.1, 0.9, (sheets, blocks)).astype(np.float32)
+    before, loss = expected(masks)
+    for sheet, block in np.ndindex(masks.shape):
+        more = masks.copy()
+        more[sheet, block] += 0.1
+        cost = 0.1 * loss[met[:, sheet] == block, sheet].sum()
+        assert expected(more)[0] - before == pytest.approx(cost, rel=1e-3, abs=2e-3)
 
 
 def posterior_of(
