@@ -71,9 +71,12 @@ def variants(parts: Sequence[str]) -> Iterator[tuple[str, PosteriorDepth]]:
         owner: Any = getattr(default, part, default)
         for name, value in vars(owner).items():
             for factor in (0.5, 2) if isinstance(value, int | float) else ():
-                changed = replace(owner, **{name: type(value)(factor * value)})
-                method = changed if owner is default else replace(default, **{part: changed})
-                yield f"{name} = {factor * value:g}", method
+                other = type(value)(factor * value)
+                changed = replace(owner, **{name: other})
+                yield (
+                    f"{name} = {other:g}",
+                    changed if owner is default else replace(default, **{part: changed}),
+                )
 
 
 def _scores(data: pcii.Dataset, method: PosteriorDepth) -> tuple[float, ...]:

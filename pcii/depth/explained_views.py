@@ -110,33 +110,38 @@ class ExplainedViews:
         between cameras that see the same block count, so that errors of its brightness do not (Neyman 1959).
         """
         photons, (masks, _, _, textures, reach) = self.photons, self.state
-        L, h, w = masks.shape
+        L, w = len(masks), masks.shape[-1]
         gain, of_sheets = np.zeros((len(photons.blocks), L), np.float32), (masks.reshape(L, -1), textures)
         moves = photons.moves, self._mean_moves()
         move_photons(*photons[:3], reach[0], moves, of_sheets, w, gain)
-        no_colour = np.zeros(len(gain), np.int8)
-        slope, curvature = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
-        add_up(slope, photons.blocks, no_colour, gain)
-        add_up(curvature, photons.blocks, no_colour, gain**2)
         seen = self._inner_blocks()
-        of_blocks = (seen * part.reshape(L, h, w) for part in (slope, curvature))
+        of_blocks = (seen * self._of_blocks(photons, values) for values in (gain, gain**2))
         steps = each_in_threads(lambda parts: self._newton_step(*parts), list(zip(*of_blocks, strict=True)))
         return np.stack(steps)
 
     def _mean_moves(self) -> tuple[np.ndarray, np.ndarray]:
-        """The mean moves (L, h w) of the rays that reach a sheet in the blocks around, down and right."""
+        """The mean moves (L, h w), down and right, of the rays that reach a sheet in the blocks around."""
         film, reach = self.film, self.state.reach[1]
-        shape = self.prior.shape
         weights = gaussian_weights(self.model.window_blocks, 3)
 
         def around(values: np.ndarray) -> np.ndarray:
-            sums = np.zeros((shape[0], 1, shape[1] * shape[2]), np.float32)
-            add_up(sums, film.blocks, film.colour, values)
-            return np.stack([gaussian_mean(part, weights) for part in sums.reshape(shape)])
+            means = [gaussian_mean(part, weights) for part in self._of_blocks(film, values)]
+            return np.reshape(means, (len(means), -1))
 
         views = around(reach) + TINY
-        down, right = ((around(reach * move[:, None]) / views).reshape(shape[0], -1) for move in film.moves)
+        down, right = (around(reach * move[:, None]) / views for move in film.moves)
         return down, right
+
+    def _of_blocks(self, rays: Rays, values: np.ndarray) -> np.ndarray:
+        """The sums (S, h, w) of the values (N, S) of rays in the blocks that they meet."""
+        return self._of_colours(rays._replace(colour=np.zeros_like(rays.colour)), values, 1)[:, 0]
+
+    def _of_colours(self, rays: Rays, values: np.ndarray, colours: int) -> np.ndarray:
+        """The same by colour, (S, Q, h, w)."""
+        _, h, w = self.prior.shape
+        sums = np.zeros((values.shape[1], colours, h * w), np.float32)
+        add_up(sums, rays.blocks, rays.colour, values)
+        return sums.reshape(*sums.shape[:2], h, w)
 
     def _inner_blocks(self) -> np.ndarray:
         """Where network and photons agree on the sheet that is seen (L, h, w) bool, so far from outlines that
@@ -188,28 +193,19 @@ class ExplainedViews:
         return masks.clip(model.least, 1 - model.least)
 
     def _state(self, masks: np.ndarray) -> State:
-        L, h, w = masks.shape
-        Q, photons, film = self.samples.size, self.photons, self.film
+        L, Q, photons, film = len(masks), self.samples.size, self.photons, self.film
         flat = masks.reshape(L, -1)
         photon_reach, film_reach = (np.zeros(rays.blocks.shape, np.float32) for rays in (photons, film))
         reach_sheets(photons.blocks, photons.order, flat, photon_reach)
         reach_sheets(film.blocks, film.order, flat, film_reach)
         film_reach *= self.views[:, None]
-        reached, exposure = np.zeros((L + 1, Q, h * w), np.float32), np.zeros((L + 1, 1, h * w), np.float32)
-        add_up(reached, photons.blocks, photons.colour, photon_reach)
-        add_up(exposure, film.blocks, film.colour, film_reach)
-        T, photon_share = self._textures(
-            masks, reached.reshape(L + 1, Q, h, w), exposure.reshape(L + 1, h, w)
-        )
+        reached, exposure = self._of_colours(photons, photon_reach, Q), self._of_blocks(film, film_reach)
+        T, photon_share = self._textures(masks, reached, exposure)
         of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
         likelihood = sum(explain_photons(*photons[:3], photon_reach, of_sheets, gain))
         expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, of_sheets, loss))
-        no_colour = np.zeros(len(gain), np.int8)
-        more, less = (np.zeros((L, 1, h * w), np.float32) for _ in range(2))
-        add_up(more, photons.blocks, no_colour, gain)
-        add_up(less, film.blocks, film.colour, loss)
-        slope = (more - less).reshape(masks.shape)
+        slope = self._of_blocks(photons, gain) - self._of_blocks(film, loss)
         return State(masks, likelihood - expected, slope, of_sheets[1], (photon_reach, film_reach))
 
     def _textures(
