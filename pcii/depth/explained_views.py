@@ -93,9 +93,8 @@ class ExplainedViews:
         return self.state.objective
 
     def sweep(self) -> bool:
-        """Masks one step better; False where that would lower F, and they stay."""
-        step = np.float32(self.model.step)
-        state = self._state((1 - step) * self.state.masks + step * self._best_masks())
+        """The best masks if all else stays; False where they would lower F, and masks stay as they are."""
+        state = self._state(self._best_masks())
         is_better = state.objective >= self.state.objective
         if is_better:
             self.state = state

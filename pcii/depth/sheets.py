@@ -37,9 +37,9 @@ class SheetModel:
     """Weight in a sheet's texture of blocks where the sheet is not, or not yet: where it is, it is the mask.
     If it is smaller, a hidden sheet has no texture before it has a mask; if larger, its texture is mixed with
     what hides it."""
-    least: float = 0.02
+    least: float = 0.005
     """What is less is nothing: of a probability, and of the mean brightness."""
-    most_nats: float = 6.0
+    most_nats: float = 7.0
     """That a block counts for or against a mask, in the mean of a window: textures are blurred and depths
     are not exact. If it is larger, outlines grow into dark surroundings in much light; if smaller, the
     network decides."""
@@ -50,9 +50,6 @@ class SheetModel:
     a block. With fewer, what outlines hide is less exact; with more, sweeps take longer."""
     sweeps: int = 6
     """At most, as long as the objective rises; with none the network decides alone."""
-    step: float = 0.8
-    """Share of the way to the best masks in a sweep. If it is larger, sheets swap places; if smaller, more
-    sweeps are needed."""
     wide_octave: int = 4
     """In windows of 2 to this power blocks sheets move in depth, and the share of noise in the evidence is
     computed. If it is larger, bent things move as one; if smaller, noise decides, and plain walls stay
