@@ -73,10 +73,8 @@ def variants(parts: Sequence[str]) -> Iterator[tuple[str, PosteriorDepth]]:
             for factor in (0.5, 2) if isinstance(value, int | float) else ():
                 other = type(value)(factor * value)
                 changed = replace(owner, **{name: other})
-                yield (
-                    f"{name} = {other:g}",
-                    changed if owner is default else replace(default, **{part: changed}),
-                )
+                method = changed if owner is default else replace(default, **{part: changed})
+                yield f"{part}: {name} = {other:g}", method
 
 
 def _scores(data: pcii.Dataset, method: PosteriorDepth) -> tuple[float, ...]:

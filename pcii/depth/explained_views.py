@@ -119,7 +119,7 @@ class ExplainedViews:
         return np.stack(steps)
 
     def _mean_moves(self) -> tuple[np.ndarray, np.ndarray]:
-        """The mean moves (L, h w), down and right, of the rays that reach a sheet in the blocks around."""
+        """The mean moves (L + 1, h w), down and right, of rays that reach the sheets in the blocks around."""
         film, reach = self.film, self.state.reach[1]
         weights = gaussian_weights(self.model.window_blocks, 3)
 
