@@ -17,10 +17,12 @@ import pcii
 from pcii.base.progress import Stages
 from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
 from pcii.evaluation.comparison import find_datasets
+from pcii.evaluation.method_names import NamedMethod
 from pcii.evaluation.tables import Table, light_name, markdown
+from pcii.evaluation.tasks import tasks_of
 from pcii.removal.posterior_masks import masks_of
 from pcii.store.suggested_depths import depth_range_of, planes_of
-from pcii.types.photon_limit import FULL_LIGHT, Light
+from pcii.types.photon_limit import Light
 
 PARTS = "model", "prior", "shown", "sheets", "search"
 """Of `PosteriorDepth`: those that have constants of their own, and its own constants."""
@@ -37,19 +39,14 @@ def main() -> int:
     try:
         chosen = [Light.parse(budget) for budget in options.budget or ()]
         datasets = [pcii.open_dataset(folder) for folder in find_datasets(options.folders)]
-        lit = [
-            (dataset, light)
-            for dataset in datasets
-            for light in chosen or dataset.lights
-            if light != FULL_LIGHT
-        ]
+        tasks = tasks_of(datasets, [NamedMethod("posterior")], chosen)
         found: dict[tuple[str, str], list[tuple[float, ...]]] = {}
         with Stages() as report:
-            for number, (dataset, light) in enumerate(lit):
-                data = dataset.at_light(light)
+            for number, task in enumerate(tasks):
+                data = task.data
                 for done, (name, method) in enumerate(methods.items(), start=1):
-                    found.setdefault((name, str(light)), []).append(_scores(data, method))
-                    report("constants", number * len(methods) + done, len(lit) * len(methods))
+                    found.setdefault((name, str(task.light)), []).append(_scores(data, method))
+                    report("constants", number * len(methods) + done, len(tasks) * len(methods))
     except pcii.InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2
@@ -57,7 +54,7 @@ def main() -> int:
     def cell(name: str, light: str) -> str:
         return ", ".join(f"{mean:.3f}" for mean in np.mean(found[name, light], axis=0))
 
-    lights = list(dict.fromkeys(str(light) for _, light in lit))
+    lights = list(dict.fromkeys(str(task.light) for task in tasks))
     rows = [(name, *(cell(name, light) for light in lights)) for name in methods]
     print(markdown(Table("", ("constant", *map(light_name, lights)), tuple(rows))))
     return 0

@@ -113,10 +113,13 @@ class ExplainedViews:
         gain, of_sheets = np.zeros((len(photons.blocks), L), np.float32), (masks.reshape(L, -1), textures)
         moves = photons.moves, self._mean_moves()
         move_photons(*photons[:3], reach[0], moves, of_sheets, w, gain)
-        seen = self._inner_blocks()
-        of_blocks = (seen * self._of_blocks(photons, values) for values in (gain, gain**2))
-        steps = each_in_threads(lambda parts: self._newton_step(*parts), list(zip(*of_blocks, strict=True)))
-        return np.stack(steps)
+        is_inner = self._inner_blocks()
+        slope, curvature = (is_inner * self._of_blocks(photons, values) for values in (gain, gain**2))
+
+        def of_sheet(sheet: int) -> np.ndarray:
+            return self._newton_step(slope[sheet], curvature[sheet])
+
+        return np.stack(each_in_threads(of_sheet, range(L)))
 
     def _mean_moves(self) -> tuple[np.ndarray, np.ndarray]:
         """The mean moves (L + 1, h w), down and right, of rays that reach the sheets in the blocks around."""
@@ -152,7 +155,7 @@ class ExplainedViews:
         from scipy.ndimage import maximum_filter, minimum_filter
 
         masks, side = self.state.masks, 2 * round(2 * self.model.window_blocks) + 1
-        of_network, sheet = (_seen_sheet(self.sheets.visible(each)) for each in (self.prior, masks))
+        of_network, sheet = (_find_visible_sheet(self.sheets.visible(each)) for each in (self.prior, masks))
         is_inner = (maximum_filter(sheet, side) == minimum_filter(sheet, side)) & (sheet == of_network)
         return is_inner & (sheet == np.arange(len(masks))[:, None, None])
 
@@ -236,8 +239,8 @@ def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetMod
     return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks), views.nearer_px())
 
 
-def _seen_sheet(visible: np.ndarray) -> np.ndarray:
-    """The number (h, w) of the sheet that is more probably seen than not, -1 where none is."""
+def _find_visible_sheet(visible: np.ndarray) -> np.ndarray:
+    """Number (h, w) of the sheet that is more probably what is seen than not, -1 where none is."""
     return np.where(visible.max(axis=0) > 0.5, visible.argmax(axis=0), -1)
 
 
