@@ -12,6 +12,7 @@ from pcii.base.progress import Stages
 from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import open_benchmark, run_method, score_submission
 from pcii.evaluation.comparison import Evaluation
+from pcii.evaluation.tables import decisive_means
 from pcii.store.collection import Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
@@ -119,8 +120,10 @@ def page(folder: Path, *, out: Out) -> None:
 
 
 def say_scores(out: Path, evaluation: Evaluation) -> None:
-    """Say which datasets of an evaluation were scored, and why some were scored again."""
+    """Say which datasets of an evaluation were scored, why some were scored again, and the decisive means."""
     for sentence in evaluation.made_again:
         say(f"made again: {sentence}")
+    for title, table in decisive_means(evaluation.means()):
+        say(f"\n{title} by photons per view\n{table}\n")
     say(f"{out / 'evaluation.html'}: scores of {evaluation.frame['identity'].nunique()} datasets")
     say_next_page(out / "evaluation.html")

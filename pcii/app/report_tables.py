@@ -3,6 +3,8 @@
 A column or row of which nothing is known is left out.
 """
 
+from collections.abc import Iterator
+
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.tables import Table
@@ -62,6 +64,24 @@ def score_table(outcome: Outcome) -> Table:
         cells.append((*texts, *("–" if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
     header = (*words, *(NUMBERS[key] for key in numbers))
     return Table("Scores of the masks", header, tuple(cells), words=len(words))
+
+
+def result_tables(outcome: Outcome) -> Iterator[str]:
+    """Lines for a terminal: IoU by method and plane, then how right depth is, as far as the truth tells."""
+    import pandas as pd
+
+    by_object = [row for row in outcome.score.planes if row["truth"] == "object" and row["iou"] is not None]
+    if by_object:
+        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or 'nothing'}" for row in by_object}
+        iou = pd.DataFrame(by_object).pivot(index="method", columns="z_mm", values="iou")
+        iou.index.name = iou.columns.name = None
+        shown = iou.rename(columns=columns).to_string(float_format="{:.3f}".format, na_rep="–")
+        yield f"IoU of the masks\n{shown}"
+    depth = outcome.score.depth
+    if depth["within_1px"] is not None:
+        names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
+        shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
+        yield f"Depth, shares of the objects' pixels\n{shares.to_string(float_format='{:.3f}'.format)}"
 
 
 def depth_table(outcome: Outcome) -> Table:

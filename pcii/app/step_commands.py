@@ -16,12 +16,15 @@ from pcii.app.command_options import (
 )
 from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
+from pcii.app.report_tables import result_tables
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.progress import Stages
-from pcii.base.safe_files import write_json_safely
+from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.exposure import encoded
-from pcii.figures.pictures import depth_image, mask_image, write_png
+from pcii.figures.panels import figure_bytes, new_figure
+from pcii.figures.pictures import mask_image, write_png
+from pcii.figures.plots import draw_depth
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
 from pcii.sections.reconstruction import reconstruct as reconstruct_sections
@@ -32,6 +35,8 @@ from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_limit import Light
 
+DEPTH_IN = 9.0
+"""Longest side of the picture of a depth map with its scale."""
 MIN_ANSWERED_SHARE = 0.1
 """Smallest share of the photons that a depth map answers for without a warning."""
 
@@ -67,9 +72,8 @@ def run(
     z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
-    for row in outcome.score.planes:
-        if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
-            say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
+    for lines in result_tables(outcome):
+        say(f"\n{lines}\n")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
     _say_hot_pixels(outcome.depth)
@@ -140,8 +144,9 @@ def depth(
     with results.writing(out, data) as folder:
         depth_map = estimate_depth(data.counts_or_views, (near, far), z_mm=planes, method=method)
         results.save_depth(folder, depth_map)
-        picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
-        write_png(folder / "depth.png", picture)
+        figure = new_figure(DEPTH_IN, DEPTH_IN, "compressed")
+        draw_depth(depth_map, figure.subplots(), (near, far))
+        write_bytes_safely(folder / "depth.png", figure_bytes(figure))
     say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, paler where less sure")
     _say_hot_pixels(depth_map)
     _warn_of_few_depths(depth_map, data, (near, far))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
-from pcii.evaluation.pages import ABOUT_YARDSTICKS, accuracy_plot, page
+from pcii.evaluation.curves import accuracy_plot
+from pcii.evaluation.pages import ABOUT_YARDSTICKS, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import (

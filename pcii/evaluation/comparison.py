@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.evaluation import summary
+from pcii.evaluation.curves import draw_evaluation
 from pcii.evaluation.measurement import EvaluationJob, measure
 from pcii.evaluation.method_names import Method, named_methods
 from pcii.evaluation.pages import write_evaluation
@@ -21,6 +22,7 @@ from pcii.store.dataset_layout import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH
 from pcii.types.photon_limit import Light
 
 if TYPE_CHECKING:
+    import numpy as np
     from pandas import DataFrame
 
 SEED = re.compile(r"(.*_)?seed_\d+")
@@ -47,9 +49,23 @@ class Evaluation:
         """
         return summary.means(summary.with_yardsticks(self.frame), by)
 
-    def ranks(self, measure: str = "iou") -> "DataFrame":
-        """Methods by their mean over scenes, compared with the best one: see `summary.ranks`."""
-        return summary.ranks(summary.with_yardsticks(self.frame), measure)
+    def ranks(self, measure: str = "iou", over: summary.Over | None = None) -> "DataFrame":
+        """Methods by their mean over scenes, or of one scene over datasets, compared with the best one.
+
+        `over` says which: "scenes" or "datasets". See `summary.ranks`.
+        """
+        return summary.ranks(summary.with_yardsticks(self.frame), measure, over)
+
+    def plot(self, measure: str = "iou", axes: Any = None, *, style: str = "screen") -> "np.ndarray":
+        """Draw a measure against photons per view, and against seconds, and return Matplotlib's axes (N,).
+
+        `measure` is "iou", "pixel_iou", "false_share", "within_1px", "within_3px", "quadratic_score" or
+        "median_px". Bars are 95 % intervals, over scenes or, of one scene, over its datasets.
+        `style="paper"` is for print:
+        `evaluation.plot("iou", style="paper")[0].figure.savefig("iou.pdf")`, or .svg. Raises `InputError` for
+        another measure or style, one that no method has, and axes that are none, or another number of them.
+        """
+        return draw_evaluation(self.means(), measure, axes, style=style)
 
 
 def evaluate(

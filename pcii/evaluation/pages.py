@@ -12,25 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.summary import means, means_over_scenes, with_yardsticks
-from pcii.evaluation.tables import NOT_BETTER, TITLES, Table, light_name, tables_of
-from pcii.figures.charts import accuracy_chart, calibration_chart
-from pcii.figures.panels import figure_uri
+from pcii.evaluation.curves import AXES, accuracy_plot, calibration_plot
+from pcii.evaluation.summary import means, over_scenes, with_yardsticks
+from pcii.evaluation.tables import NOT_BETTER, TITLES, Table, tables_of
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-AXES = {
-    "iou": "IoU, mean over planes that hold objects",
-    "pixel_iou": "IoU with the points in focus, mean over planes",
-    "false_share": "share of the film claimed falsely",
-    "within_1px": "share of depths within 1 px",
-    "within_3px": "share of depths within 3 px",
-    "quadratic_score": "quadratic score of confidence",
-    "median_px": "median error of depth, px of total disparity",
-}
-"""Measures of accuracy that are drawn, with the labels of their axes."""
 ABOUT_YARDSTICKS = (
     "Three look at no photon: (nothing) claims nothing and answers nowhere, (everything) claims the whole "
     "film at every plane, and (one depth) answers the depth that is right for most pixels, which only the "
@@ -98,8 +87,9 @@ def write_evaluation(
     differing = ", ".join(origin["differing"])
     warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
     content = {
-        "notes": [*NOTES, warning] if differing else NOTES,
-        "plots": _plots(of_cells if frame["scene"].nunique() == 1 else means_over_scenes(of_cells, {})),
+        "warnings": [warning] if differing else [],
+        "notes": NOTES,
+        "plots": _plots(over_scenes(of_cells)),
         "tables": list(tables_of(frame, of_cells)),
         "origin": _origin_table(origin, hash_file(out / ROWS)),
     }
@@ -119,36 +109,8 @@ def _plots(table: "DataFrame") -> list[tuple[str, str]]:
     for measure in TITLES:
         methods = sorted(table["method"][table["measure"] == measure].unique())
         plots.append((accuracy_plot(table, methods, measure), f"{AXES[measure]} against photons and time"))
-    plots.append((_calibration_plot(table, methods), "share of correct depths against confidence, by light"))
+    plots.append((calibration_plot(table, methods), "share of correct depths against confidence, by light"))
     return [(image, text) for image, text in plots if image]
-
-
-def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> str:
-    """One of `AXES` against photons per view, and against seconds, as a PNG in a data URI.
-
-    `table` has means by method, light and measure. Empty if no method has the measure.
-    """
-    cells = table[table["measure"] == measure].set_index(["method", "light"])
-    if cells.empty:
-        return ""
-    cells = cells[["mean", "low", "high"]]
-    cells = cells.assign(**{end: cells[end].fillna(cells["mean"]) for end in ("low", "high")})
-    for name in ("photons_per_view", "seconds"):
-        cells[name] = table[table["measure"] == name].set_index(["method", "light"])["mean"]
-    is_share = measure != "median_px"
-    figure = accuracy_chart(cells.reset_index(), methods, AXES[measure], is_share=is_share)
-    return "" if figure is None else figure_uri(figure)
-
-
-def _calibration_plot(table: "DataFrame", methods: Sequence[str]) -> str:
-    """Share of correct depths against their stated confidence, by light; empty if nothing is answered."""
-    parts = table["measure"].str.extract(r"^(reliability\..*)\.(\w+)$")
-    bins = table.assign(bin=parts[0], part=parts[1]).dropna(subset="bin")
-    if bins.empty:
-        return ""
-    bins = bins.pivot(index=["method", "light", "bin"], columns="part", values="mean").reset_index()
-    bins = bins.dropna(subset="confidence").sort_values(["light", "method"], kind="stable")
-    return figure_uri(calibration_chart(bins.assign(light=bins["light"].map(light_name)), methods))
 
 
 def _origin_table(origin: Mapping[str, Any], rows_sha256: str) -> Table:

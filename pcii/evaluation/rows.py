@@ -35,6 +35,8 @@ Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 NO_MEASURES = frozenset(HEAD)
 """Columns of the frame that say of what a row is."""
+LIGHTS = ("photons.budget", "photons.nested")
+"""Settings that say in which light a scene is seen, and nothing of the scene; it is the `budget` of a row."""
 MAX_COLUMNS = 300
 """Some three times what the measures need; a page takes 10 ms for each."""
 
@@ -45,8 +47,11 @@ def identity_of(manifest: "DatasetManifest") -> str:
 
 
 def recipe_of(manifest: "DatasetManifest") -> str:
-    """Hash of a dataset's recipe without the seed, and of its scene; seeds of one recipe share it."""
-    recipe = {name: value for name, value in manifest.recipe.items() if name != "seed"}
+    """Hash of a dataset's recipe without its seed and its light, and of its scene.
+
+    Seeds and amounts of light of one scene share it.
+    """
+    recipe = {name: value for name, value in _leaves(manifest.recipe) if name not in ("seed", *LIGHTS)}
     if not recipe:
         return identity_of(manifest)[:16]
     return hash_json({"recipe": recipe, "scene": manifest.get("scene")})[:16]
@@ -62,7 +67,9 @@ def describe_dataset(dataset: Dataset, z_mm: Sequence[float]) -> Row:
         "recipe": recipe_of(manifest),
         "title": manifest.title or dataset.name,
         "seed": recipe.get("seed"),
-        "settings": dict(_leaves({name: recipe[name] for name in recipe if name not in ("title", "seed")})),
+        "settings": {
+            name: value for name, value in _leaves(recipe) if name not in ("title", "seed", *LIGHTS)
+        },
     }
     if z_mm:
         row["z_mm"] = [*z_mm]

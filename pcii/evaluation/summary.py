@@ -1,6 +1,7 @@
 """Means of an evaluation with their intervals, and comparisons of methods on the same datasets.
 
-All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed alone are one scene.
+All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
+alone are one scene.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame, Series
 
 Kind = Literal["signed", "share", "positive", "geometric"]
+Over = Literal["scenes", "datasets"]
 CONFIDENCE = 0.95
 MAX_EXACT_PAIRS = 14
 """Largest number of pairs of which all assignments of signs are computed: 2^14 means take milliseconds."""
@@ -197,28 +199,45 @@ def _group_means(values: "Series", by: Sequence[str], kind: Kind, measure: str) 
     return table.assign(mean=ends[:, 0], low=ends[:, 1], high=ends[:, 2])
 
 
-def ranks(frame: "DataFrame", measure: str, over: str = "scene") -> "DataFrame":
+def over_scenes(of_cells: "DataFrame") -> "DataFrame":
+    """Means by light and method from those of `means`: over scenes, and of one scene over its datasets."""
+    return of_cells if of_cells["scene"].nunique() < MIN_SCENES else means_over_scenes(of_cells, {})
+
+
+def ranked_over(frame: "DataFrame", measure: str) -> Over:
+    """What methods are ranked over if nothing is said: scenes, and of one scene its datasets."""
+    scenes = frame["scene"][frame[measure].notna()].nunique() if measure in frame else 0
+    return "datasets" if scenes < MIN_SCENES else "scenes"
+
+
+def ranks(frame: "DataFrame", measure: str, over: Over | None = None) -> "DataFrame":
     """Methods at each light by their mean over scenes, the best first, on the datasets that all have.
 
     Each scene counts once, as the mean over its seeds: further seeds say more about the same scene, and only
-    other scenes say how far a result holds. With `over` = "identity" each dataset counts, as for one scene.
+    other scenes say how far a result holds. With `over` = "datasets" each dataset counts, as for one scene
+    without it. A light of one scene has no ranks over scenes.
     Columns: `light`, `method`, `rank` (equal methods share one), `n` scenes (or datasets), `mean` with its
     interval from `low` to `high`; of the difference to the best method on the same scenes `difference`,
     `difference_low`, `difference_high`, `p` (see `sign_flip_p`) and `least_p`. Raises `InputError` for a
-    measure that is not among `MORE_IS_BETTER`.
+    measure that is not among `MORE_IS_BETTER`, for another `over`, and for ranks of one scene over scenes.
     """
     import pandas as pd
 
     if measure not in MORE_IS_BETTER:
         raise InputError(f"measure: methods are ranked by {', '.join(MORE_IS_BETTER)}, got {measure!r}")
-
+    possible = ranked_over(frame, measure)
+    if over not in (None, "scenes", "datasets"):
+        raise InputError(f"over: expected 'scenes' or 'datasets', got {over!r}")
+    if over == "scenes" and possible == "datasets":
+        raise InputError("over: one scene has no spread over scenes; use over='datasets'")
+    key = "scene" if (over or possible) == "scenes" else "identity"
     tables = [pd.DataFrame(columns=["light", "method"])]
     known = frame[frame[measure].notna()] if measure in frame else frame[:0]
     for light, at_light in known.groupby("light", observed=True):
-        keys = list(dict.fromkeys([over, "seed", "identity"]))
+        keys = list(dict.fromkeys([key, "seed", "identity"]))
         values = at_light.pivot_table(measure, keys, "method", observed=True, dropna=False, sort=True)
-        values = values.dropna().groupby(level=over, observed=True).mean()
-        if not len(values) or (over == "scene" and len(values) < MIN_SCENES):
+        values = values.dropna().groupby(level=key, observed=True).mean()
+        if not len(values) or (key == "scene" and len(values) < MIN_SCENES):
             continue
         x = values.to_numpy().T.copy()
         score = x.mean(axis=-1)

@@ -9,7 +9,15 @@ import numpy as np
 from pcii.base.plain_text import in_markdown
 from pcii.depth.methods import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
-from pcii.evaluation.summary import LOOK_AT_NO_PHOTON, MORE_IS_BETTER, lines_of, ranks
+from pcii.evaluation.summary import (
+    LOOK_AT_NO_PHOTON,
+    MORE_IS_BETTER,
+    Over,
+    lines_of,
+    over_scenes,
+    ranked_over,
+    ranks,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -99,19 +107,29 @@ def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
 
     `frame` is of `summary.with_yardsticks`, `of_cells` its means by scene, light and method.
     """
-    scenes = frame["scene"].nunique()
-    over = "scene" if scenes > 1 else "identity"
     for (decisive, title), names in zip(TITLES.items(), (REMOVAL, DEPTH), strict=True):
         means = of_cells[of_cells["measure"] == decisive]
         if not len(means):
             continue
-        ranked = ranks(frame, decisive, over)
+        ranked = ranks(frame, decisive)
         if len(ranked):
-            unit = "scenes" if over == "scene" else "datasets"
+            unit = ranked_over(frame, decisive)
             yield rank_table(ranked, f"{title}, methods compared on the same {unit}", unit)
         yield mean_table(f"{title} by photons per view", means, ["scene", "method"], "light", light_name)
-        if scenes <= MAX_DETAILED_SCENES:
+        if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
             yield _measure_table(f"{title} beside other measures", of_cells, means, names)
+
+
+def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
+    """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
+    means = over_scenes(of_cells)
+    for measure, title in TITLES.items():
+        own = means[means["measure"] == measure]
+        if len(own):
+            table = own.pivot(index="method", columns="light", values="mean").sort_index(axis="columns")
+            table = table.rename(columns={light: light_name(light) for light in table.columns})
+            table.index.name = table.columns.name = None
+            yield title, table.to_string(float_format="{:.3f}".format, na_rep="–")
 
 
 def _measure_table(title: str, of_cells: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> Table:
@@ -170,7 +188,7 @@ def mean_table(
     return Table(title, (*rows, *map(name, shown.columns)), tuple(lines), len(rows), best)
 
 
-def rank_table(table: "DataFrame", title: str, unit: str = "scenes") -> Table:
+def rank_table(table: "DataFrame", title: str, unit: Over = "scenes") -> Table:
     """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
     rows = [
         (

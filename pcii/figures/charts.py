@@ -13,8 +13,13 @@ from pcii.figures.panels import COLOURS, GRID_COLOUR, MARKERS, new_figure, plot_
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
+PLACES = {"photons_per_view": "photons per view", "seconds": "seconds per dataset"}
+"""What accuracy is drawn against."""
+SHORT_AXIS = 200.0
+"""A logarithmic axis whose ends have a smaller ratio has more than one number a decade."""
 MIN_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 COLUMNS = 4
@@ -47,20 +52,33 @@ def _draw_reliability(axes: "Axes", bins: "pd.DataFrame", style: Mapping[str, An
 def accuracy_chart(
     means: "pd.DataFrame", methods: Sequence[str], label: str, *, is_share: bool
 ) -> "Figure | None":
-    """A measure of accuracy against photons per view, and against seconds; None if neither is known.
-
-    `means` has a row for each method and light: `method`, `photons_per_view`, `seconds`, `mean`, and the ends
-    of its interval, `low` and `high`. Each of `methods` has one colour and marker in all charts. What is no
-    share from 0 to 1 has a logarithmic axis. Full light is at no number of photons.
-    """
-    places = {"photons_per_view": "photons per view", "seconds": "seconds per dataset"}
-    known = [place for place in places if means[place].notna().any()]
+    """A figure of `draw_accuracy`; None if neither photons nor seconds are known."""
+    known = known_places(means)
     if not known:
         return None
     figure = new_figure(0.3 + 5.1 * len(known), 4.2, "constrained")
     panels = figure.subplots(1, len(known), sharey=True, squeeze=False)[0]
+    draw_accuracy(panels, means, methods, label, is_share=is_share)
+    return figure
+
+
+def known_places(means: "pd.DataFrame") -> list[str]:
+    """Which of `PLACES` is known of any mean."""
+    return [place for place in PLACES if means[place].notna().any()]
+
+
+def draw_accuracy(
+    panels: np.ndarray, means: "pd.DataFrame", methods: Sequence[str], label: str, *, is_share: bool
+) -> None:
+    """Draw a measure of accuracy against photons per view and seconds, as far as they are known.
+
+    `means` has a row for each method and light: `method`, `photons_per_view`, `seconds`, `mean`, and the ends
+    of its interval, `low` and `high`. Each of `methods` has one colour and marker in all charts. What is no
+    share from 0 to 1 has a logarithmic axis. Full light is at no number of photons. `panels` are axes, one
+    for each of `known_places`, of one figure.
+    """
     handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the two
-    for axes, place in zip(panels, known, strict=True):
+    for axes, place in zip(panels, known_places(means), strict=True):
         rows = means[means[place].notna()]
         for number, method in enumerate(methods):
             own = rows[rows["method"] == method]
@@ -71,17 +89,30 @@ def accuracy_chart(
             if place == "seconds":  # they hardly follow the light, so that a line would go to and fro
                 style["linestyle"] = "none"
             handles[plot_label(method)] = axes.errorbar(own[place], own["mean"], yerr=bars, **style)
-        axes.set_xlabel(places[place])
+        axes.set_xlabel(PLACES[place])
         if is_share:
             axes.set_ylim(min(-0.02, rows["low"].min()), 1.02)
         else:
             axes.set_yscale("log")
+            _write_plain_numbers(axes.yaxis)
         quiet_grid(axes)
         if (rows[place] > 0).all():
             axes.set_xscale("log")
+            _write_plain_numbers(axes.xaxis)
     panels[0].set_ylabel(label)
-    _add_legend(figure, {name: handles[name] for name in sorted(handles)}, 4)
-    return figure
+    figure = panels[0].get_figure(root=True)
+    _add_legend(figure, {name: handles[name] for name in sorted(handles)}, 2 * len(panels))
+
+
+def _write_plain_numbers(axis: "Axis") -> None:
+    """Plain numbers along a logarithmic axis: at 1, 2 and 5 of each decade where it is short, else at 1."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    low, high = axis.get_view_interval()
+    steps = (1.0, 2.0, 5.0) if high < SHORT_AXIS * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(StrMethodFormatter("{x:.10g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":

@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -48,6 +49,18 @@ def plot_label(name: str) -> str:
     return name.lstrip("_").replace("$", r"\$")
 
 
+def in_style(style: str) -> AbstractContextManager[None]:
+    """What is drawn meanwhile is for the screen, in Matplotlib's style in use, or for "paper": on white.
+
+    Raises `InputError` for another style.
+    """
+    from matplotlib.style import context
+
+    if style not in ("screen", "paper"):
+        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
+    return context("default" if style == "paper" else {})
+
+
 def several_axes(
     axes: "MaybeAxes",
     count: int,
@@ -86,11 +99,16 @@ def new_figure(width_in: float, height_in: float, layout: Literal["compressed", 
     return figure
 
 
-def figure_uri(figure: "Figure") -> str:
-    """A figure as a data URI of a PNG for HTML."""
+def figure_bytes(figure: "Figure") -> bytes:
+    """A figure as PNG."""
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
-    return uri_of("png", stored.getvalue())
+    return stored.getvalue()
+
+
+def figure_uri(figure: "Figure") -> str:
+    """A figure as a data URI of a PNG for HTML."""
+    return uri_of("png", figure_bytes(figure))
 
 
 def show_picture(

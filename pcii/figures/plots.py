@@ -22,6 +22,7 @@ from pcii.figures.panels import (
     draw_outline,
     draw_scale_bar,
     hide_frame,
+    in_style,
     plot_label,
     several_axes,
     show_picture,
@@ -52,11 +53,7 @@ def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any)
     The style "paper", for print, has a white background and a scale bar instead of axes in pixels: in mm at
     the depth of a section, else in px. Raises `InputError` for another style than that and "screen".
     """
-    from matplotlib.style import context
-
-    if style not in ("screen", "paper"):
-        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
-    with context("default" if style == "paper" else {}):
+    with in_style(style):
         panels = DRAWINGS[type(value).__name__](value, axes, **options)
         if style == "paper":
             for panel, mm_per_px in zip(panels, _pixel_sizes_mm(value, len(panels)), strict=True):

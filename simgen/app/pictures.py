@@ -98,12 +98,7 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     whole.imshow(to_srgb8(picture, white_level(picture[objects] if objects.any() else picture)))
     whole.set_title("virtual centre")
     hide_frame(whole)
-    rows, cols = part_of_interest(objects)
-    if rows.stop - rows.start < grid.height:
-        left, right, top, bottom = (edge - 0.5 for edge in (cols.start, cols.stop, rows.start, rows.stop))
-        corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
-        whole.plot(*corners, color="0.6", linewidth=0.8)
-    _draw_truth(depth, objects_by_name, Truth(hits.z_mm, hits.object_id, render_scene.names))
+    _draw_truth(depth, objects_by_name, Truth(hits.z_mm, hits.object_id, render_scene.names), whole)
     title = recipe.title or target.scene.title
     figure.suptitle(title, parse_math=False)
     figure.draw_without_rendering()
@@ -128,11 +123,23 @@ def part_of_interest(mask: np.ndarray) -> tuple[slice, slice]:
     return box[0], box[1]
 
 
-def _draw_truth(depth: "Axes", objects: "Axes", truth: Truth) -> None:
-    """Depth of the objects, and the objects by name, in the part of the film where they are."""
-    box = part_of_interest(truth.object_id > 0)
+def _draw_truth(depth: "Axes", objects: "Axes", truth: Truth, whole: "Axes | None") -> None:
+    """Depth of the objects, and the objects by name, in the part of the film where they are.
+
+    Titles say if it is a part, which has a frame in the picture of the `whole` film, if there is one.
+    """
+    rows, cols = box = part_of_interest(truth.object_id > 0)
     Truth(truth.z_mm[box], truth.object_id[box], truth.names).plot([depth, objects])
     hide_frame(depth)
+    if rows.stop - rows.start == len(truth.object_id):
+        return
+    if whole is not None:
+        left, right, top, bottom = (edge - 0.5 for edge in (cols.start, cols.stop, rows.start, rows.stop))
+        corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
+        whole.plot(*corners, color="0.6", linewidth=0.8)
+    part = "part of the film" if whole is None else "the part in the frame"
+    for axes in (depth, objects):
+        axes.set_title(f"{axes.get_title()}: {part}")
 
 
 def write_sheet(path: Path, out: Path) -> None:
@@ -157,15 +164,18 @@ def draw_sheet(dataset: Dataset) -> "Figure":
         f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, "
         f"{dataset.cfa or 'monochrome'}, pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm",
     ]
+    whole = None
     if views is not None:
-        views.plot(panels["view"])
+        whole = panels["view"]
+        views.plot(whole)
     if dataset.has(COUNTS):
         counts = dataset.counts
         lines.append(f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view")
-        panels["photons"].set_title(f"photons of up to {MAX_TILES} x {MAX_TILES} views")
+        shown = " x ".join(str(min(side, MAX_TILES)) for side in (grid.rows, grid.cols))
+        panels["photons"].set_title(f"photons of {shown} views")
         panels["photons"].imshow(photon_tiles(counts), interpolation="nearest")
     if truth is not None:
-        _draw_truth(panels["depth"], panels["objects"], truth)
+        _draw_truth(panels["depth"], panels["objects"], truth, whole)
     for axes in panels.values():
         hide_frame(axes)
     figure.suptitle("\n".join(lines), fontsize=12, parse_math=False)

@@ -23,9 +23,11 @@ OWN, NESTED = 50.0, 20.0
 def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str = "by hand") -> Path:
     """A dataset in whose first view, at each budget, so many of the near object's ten pixels have a photon.
 
-    All pixels of the far object have two. In the last view all pixels have one.
+    The largest budget is its own, the others are nested. All pixels of the far object have two. In the last
+    view all pixels have one.
     """
     root.mkdir(parents=True)
+    own = max(hits)
     for budget, near in hits.items():
         dense = np.zeros(GRID.shape_KLHW, dtype=np.int64)
         dense[1, 1] = 1
@@ -34,7 +36,7 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
         first[:near] = 1
         dense[0, 0][NEAR] = first.reshape(2, 5)
         k, l, i, j = np.nonzero(dense)
-        part = nested_name(COUNTS, None if budget == OWN else budget)
+        part = nested_name(COUNTS, None if budget == own else budget)
         events = {"k": k, "l": l, "i": i, "j": j, "n": dense[k, l, i, j]}
         write_arrays_safely(root / part, events, COUNTS_LABELS)
     z_mm, ids = np.full((8, 12), np.inf), np.zeros((8, 12), dtype=np.int16)
@@ -42,8 +44,8 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
     z_mm[FAR], ids[FAR] = 2.0, 2
     write_arrays_safely(root / TRUTH, {"z_mm": z_mm, "object_id": ids}, TRUTH_LABELS)
     keys = ("rows", "cols", "pitch_mm", "focal_mm", "pixel_mm", "height", "width")
-    nested = [budget for budget in hits if budget != OWN]
-    parts = [TRUTH, *(nested_name(COUNTS, None if budget == OWN else budget) for budget in hits)]
+    nested = [budget for budget in hits if budget != own]
+    parts = [TRUTH, *(nested_name(COUNTS, None if budget == own else budget) for budget in hits)]
     manifest = {
         "identity": f"{title}, seed {seed}",
         "title": title,
@@ -54,7 +56,7 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
         "recipe": {
             "scene": title,
             "seed": seed,
-            "photons": {"scope": "view", "budget": OWN, "nested": nested},
+            "photons": {"scope": "view", "budget": own, "nested": nested},
         },
         "scene": {},
         "files": list_files(root, parts),

@@ -118,6 +118,23 @@ def test_the_files_hold_the_same_figures(evaluated: Evaluation) -> None:
     assert ["<tr>by hand", "by count", *best] in rows
 
 
+def test_curves_are_of_the_means(evaluated: Evaluation, tmp_path: Path) -> None:
+    axes = evaluated.plot("iou", style="paper")
+    assert len(axes) == 2  # against photons and against seconds
+    means = [mean_of(evaluated, light, "by count", "iou").mean for light in (NESTED, OWN)]
+    curves = [list(container.lines[0].get_ydata()) for container in axes[0].containers]
+    assert means in curves
+    axes[0].figure.savefig(tmp_path / "iou.pdf")
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"measure": "speed"}, "measure: expected one of iou"),
+        ({"measure": "within_1px"}, "measure: no method has 'within_1px'"),
+        ({"style": "thesis"}, "style: expected 'screen' or 'paper', got 'thesis'"),
+    ]
+    for wrong, sentence in refused:
+        with pytest.raises(InputError, match=f"^{sentence}"):
+            evaluated.plot(**wrong)
+
+
 def change_recipe(dataset: Path, **settings: Any) -> None:
     manifest = read_manifest(dataset)
     recipe = manifest.recipe | settings
@@ -143,6 +160,27 @@ def test_scenes_come_in_the_order_of_the_datasets_with_the_settings_that_differ(
     # Scenes of earlier runs come last.
     again = evaluate(data[:1], tmp_path / "out", methods=["by count"])
     assert list(again.frame["scene"].cat.categories) == [labels[4], *labels[:4]]
+
+
+def test_amounts_of_light_of_one_scene_are_one_scene_however_they_came_about(
+    series: Path, tmp_path: Path, calls: list[str]
+) -> None:
+    """Datasets of one budget each, as a sweep makes them, give the figures of those with nested budgets."""
+    single: list[Path] = []
+    for seed, (own, nested) in HITS.items():
+        for light, hits in ((OWN, own), (NESTED, nested)):
+            single.append(write_dataset(tmp_path / f"{light}_{seed}", seed, {light: hits}))
+            change_recipe(single[-1], photons={"budget": light, "nested": [], "scope": "view"})
+    swept = evaluate(single, tmp_path / "swept", methods=FAKES)
+    nested = evaluate([series], tmp_path / "nested", methods=FAKES)
+    assert list(swept.frame["scene"].cat.categories) == ["by hand"]
+    for one, other in ((swept.means(), nested.means()), (swept.ranks(), nested.ranks())):
+        assert len(one) == len(other) > 0
+    iou = mean_of(swept, OWN, "by count", "iou")
+    assert iou[-4:] == mean_of(nested, OWN, "by count", "iou")[-4:]
+    assert iou.n == len(HITS)
+    change_recipe(single[0], photons={"budget": OWN, "nested": [], "scope": "channel"})
+    assert evaluate(single, tmp_path / "out", methods=FAKES).frame["scene"].nunique() == 2
 
 
 def test_a_depth_map_without_estimates_is_reported_as_such(

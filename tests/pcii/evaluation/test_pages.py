@@ -32,7 +32,8 @@ SCRIPT = (Path(pages_module.__file__).parent / "templates" / "report.js").read_b
 SCRIPT_HASH = base64.b64encode(hashlib.sha256(SCRIPT).digest()).decode()
 # The report runs its own script, which its policy names by hash, and has controls and lists of numbers.
 OWN_ELEMENTS = {
-    "report.html": {"script", "section", "label", "input", "output", "i"} | {"details", "summary", "pre"}
+    "report.html": {"script", "section", "label", "input", "output", "i"} | {"details", "summary", "pre"},
+    "evaluation.html": {"details", "summary"},
 }
 POLICIES = {
     "report.html": POLICY.replace("img-src", f"script-src 'sha256-{SCRIPT_HASH}'; img-src"),
@@ -92,7 +93,7 @@ def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     with pytest.MonkeyPatch.context() as patch:
         # A plot takes half a second.
         patch.setattr(pages_module, "accuracy_plot", lambda *_: PICTURE)
-        patch.setattr(pages_module, "_calibration_plot", lambda *_: PICTURE)
+        patch.setattr(pages_module, "calibration_plot", lambda *_: PICTURE)
         patch.setattr(tables, "MAX_DETAILED_SCENES", 2 * len(NAMES))
         write_evaluation(out, frame_of(rows), origin_of(rows))
     return {name: (out / name).read_bytes().decode() for name in POLICIES}

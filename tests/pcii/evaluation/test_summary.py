@@ -173,8 +173,10 @@ def test_one_method_over_many_scenes_has_one_mean_and_equal_methods_share_a_rank
     assert found == pytest.approx([4, 0.375, 0, 0.8886], abs=1e-4)
     equal = frame_of([row(scene, 1, method, 0.5) for scene in ("cards", "slats") for method in (A, B)])
     assert ranks(equal, "within_1px")["rank"].tolist() == [1, 1]
-    assert not len(ranks(frame_of(BY_HAND[:4]), "within_1px"))  # one scene has no spread over scenes
-    assert ranks(frame_of(BY_HAND[:4]), "within_1px", "identity")["mean"].tolist() == [0.5, 0.25]
+    one_scene = frame_of(BY_HAND[:4])
+    assert ranks(one_scene, "within_1px")["mean"].tolist() == [0.5, 0.25]
+    with pytest.raises(InputError, match=r"^over: one scene .*; use over='datasets'"):
+        ranks(one_scene, "within_1px", "scenes")
 
 
 def test_means_are_over_the_seeds_that_have_a_value() -> None:

@@ -193,6 +193,11 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     _, bars = (each for each in by_photons.collections if isinstance(each, LineCollection))
     assert bars.get_segments()[0].tolist() == [[10, 0.25], [10, 1]]
     assert np.shape(by_seconds.lines[0].get_xydata()) == (2, 2)
+    figure.draw_without_rendering()
+    for axes, numbers in ((by_photons, {"10", "20", "50", "100"}), (by_seconds, {"1", "2"})):
+        texts = [*axes.get_xticklabels(), *axes.get_xticklabels(minor=True)]
+        assert numbers <= {text.get_text() for text in texts}
+        assert not any("10^" in text.get_text() for text in texts)
     assert accuracy_chart(means.iloc[:0], ["a"], "IoU", is_share=True) is None
     bins = pd.DataFrame(
         {"method": ["a"], "light": ["x"], "confidence": [0.9], "correct": [0.8], "share": [1.0]}
