@@ -14,6 +14,7 @@ from pcii.evaluation.summary import mean_interval, sign_flip_p
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
+from pcii.exchange.frame_formats import FrameFormat
 from pcii.exchange.hci_scenes import import_hci
 from pcii.exchange.image_folders import LensArray, import_images, import_lens_array
 from pcii.exchange.stated_cameras import Optics, ViewOrder
@@ -43,6 +44,7 @@ __all__ = [
     "DepthMap",
     "DepthPosterior",
     "FocalPlanes",
+    "FrameFormat",
     "InputError",
     "LensArray",
     "Light",

@@ -3,13 +3,16 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
 from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
+from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.exchange.camera_fit import CameraFit, check_grid
+from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
 from pcii.exchange.import_requests import (
     Cameras,
     Lenses,
@@ -18,13 +21,18 @@ from pcii.exchange.import_requests import (
     WholePair,
     read,
 )
-from pcii.exchange.stated_cameras import ViewOrder
+from pcii.exchange.stated_cameras import Tell, ViewOrder
+from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
 
+MOVING_SHARE = 0.25
+"""Of the longer side: a total disparity with which nothing stands still in the views."""
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 
@@ -36,9 +44,8 @@ def import_dataset(
     pattern: str | None = None,
     grid: WholePair = None,
     counts: bool = False,
-    bitpack: bool = False,
-    width: int | None = None,
     frames: WholePair = None,
+    stored: Annotated[FrameFormat, FLAT] = AS_COUNTED,
     cameras: Annotated[Cameras, FLAT] = CAMERAS,
     order: Annotated[ViewOrder, FLAT] = ORDER,
     lenses: Annotated[Lenses, FLAT] = LENSES,
@@ -71,17 +78,13 @@ def import_dataset(
     out
         Folder for the dataset: new or empty.
     pattern
-        Names of the files of a folder, with {row} and {col}, or with {index} that counts along the rows; *
-        stands for any text.
+        Names of the files of a folder, with {row} and {col}, or with {index} that counts along the rows; of
+        counts {frame} too; * stands for any text.
     grid
         Rows and columns of cameras, for {index}, for pages, and for arrays whose first axis counts the views.
         Default: square.
     counts
         The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
-    bitpack
-        Frames in .npy files are of bits, packed along the width as numpy.packbits does.
-    width
-        Pixels in a row of packed frames. Default: all bits.
     frames
         First and last frame to add up, counted from 0. Default: all.
     cfa
@@ -100,10 +103,10 @@ def import_dataset(
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
     options: dict[str, Any] = {"pattern": pattern, "grid": grid, "counts": counts}
-    options |= {"bitpack": bitpack, "width": width, "frames": frames}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
-    for group in (cameras, order, lenses, light):
+    for group in (cameras, order, lenses, light, stored):
         options |= vars(group)
+    options["frames"] = frames
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
@@ -116,7 +119,7 @@ def import_dataset(
             images.append(limit_photons(imported.images, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
         z_range = z_range_mm or imported.z_range_mm
-        fit = check_grid(imported.images, z_range, order=order)
+        fit = check_grid(_without_hot_pixels(imported.images, notes.append), z_range, order=order)
         dataset = save_dataset(
             out,
             images,
@@ -128,16 +131,36 @@ def import_dataset(
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
-    sensor = "mono" if dataset.cfa is None else f"{dataset.cfa} Bayer pattern"
+    channels = images[0].channel_count if isinstance(images[0], Views) else 1
+    sensor = f"{dataset.cfa} Bayer pattern" if dataset.cfa else "mono" if channels == 1 else "RGB"
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    advice = None if imported.states_cameras else _advice(fit, order, lenses, z_range)
+    # Wrong numbers make no order of views right.
+    is_judged = not imported.states_cameras and not any(note.startswith("warning:") for note in notes)
+    advice = _advice(fit, order, lenses, z_range) if is_judged else None
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
     _say_depths(fit)
     say_next("pcii", "run", out, "-o", results_folder(out))
+
+
+def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | PhotonCounts:
+    """Counts to judge the cameras by: hot pixels, which stand still in all views, would be sharp at infinity.
+
+    Says how many there are. Warns of frames that are saturated.
+    """
+    if isinstance(images, Views) or images.grid.view_count < 2:
+        return images
+    warn_of_saturation(images)
+    grid = images.grid
+    moving_mm = depth_of_total_disparity_mm(grid, np.array([max(grid.shape_HW) * MOVING_SHARE]))
+    cleaned, hot = without_hot_pixels(images, FocalPlanes.at_depths(grid, moving_mm))
+    if hot:
+        share = f"{hot} of {grid.height * grid.width} pixels"
+        tell(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
+    return cleaned
 
 
 def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:

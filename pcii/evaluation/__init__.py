@@ -4,6 +4,7 @@ benchmark_page     One page of all submissions in a folder: lines over light, ta
 benchmark_scores   Scores of a method on the public benchmark: of one that is run here, or of maps that were
                    made elsewhere.
 comparison         Methods compared over many datasets: `pcii.evaluate`.
+curves             A measure against photons and time, and how far confidence is right.
 entropy_intervals  Intervals of Table 1 for one dataset: how far the entropies would differ with other
                    photons.
 measurement        Measuring the tasks of an evaluation: a method is run, timed and scored against the truth.

@@ -7,6 +7,7 @@ dataset_card     README.md of a dataset or collection: what it is, how to open i
 export_formats   The formats that datasets are written in, by name; and those of single photons: events
                  and photon cubes.
 export_pictures  Pictures of 8 bits of all views, and the folder of pictures and poses for nerfstudio.
+frame_formats    How files keep the frames of a photon counter, and what looks wrong in them.
 hci_scenes       The layout of the HCI 4D light field benchmark (Honauer et al. 2016), read and written.
 image_folders    Elemental images from pictures: a file a view, a page a view, a picture of a lens array.
 import_requests  Which reader takes a source, and which options go with it.

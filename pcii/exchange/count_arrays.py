@@ -1,10 +1,9 @@
 """Arrays of light and of photon counts, and files of photon counts, whose frames are added up.
 
-The frames of a view are an array (T, H, W) or, packed, (T, H, ceil(W / 8)) of uint8: the first pixel of a row
-is in the highest bit of its first byte, as numpy.packbits has it. Files may be larger than memory.
+How frames are kept is a `FrameFormat`. Files may be larger than memory.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -12,12 +11,22 @@ from typing import NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.exchange.image_folders import VIEWS, files_by_camera, is_picture, pages_of, views_of
+from pcii.exchange.frame_formats import (
+    AS_COUNTED,
+    EXACT,
+    SURE_NATS,
+    FrameFormat,
+    expected_above_one,
+    map_array,
+    warn_of_bit_order,
+    warn_of_dark_columns,
+    warn_of_numbers,
+)
+from pcii.exchange.image_folders import files_by_camera, is_picture, pages_of, views_of
 from pcii.exchange.pixel_files import Encoding, decode, picture_of, to_radiance
 from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
-from pcii.types.arrays import whole_counts
+from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -28,13 +37,6 @@ MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
 FRAMES_AT_ONCE = 255
 """Their sum fits in a byte."""
-MIN_COLUMN_MEAN = 10
-"""Mean number of counts of a column from which a column without any is warned of; by chance it is one in
-e^10. If it is smaller, dim captures are warned of without a reason."""
-EXACT = tuple(kind for kind in VIEWS if kind != "JPEG")
-"""Kinds of pictures that keep photon counts."""
-MIN_JUDGED_BYTES = 100
-"""Number of bytes above 0 from which they are tested for packed bits. If it is smaller, chance decides."""
 
 
 def import_arrays(
@@ -85,124 +87,123 @@ def import_counts(
     order: ViewOrder = AS_STORED,
     cfa: str | None = None,
     frames: tuple[int, int] | None = None,
-    bitpack: bool = False,
-    width: int | None = None,
+    stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
     tell: Tell = warn,
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
     An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, or a .npy file
-    (N, H, W) or (H, W); for `pattern` and `grid`, and for one TIFF file whose pages are the views, see
-    `import_images`. An array, or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W);
-    with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W). With `bitpack` arrays have frames of bits, eight
-    pixels in a byte, whose rows are `width` pixels wide, by default all bits. `frames` are the first and the
-    last to add up, from 0. The frame of each single count of bits and of arrays of bool is kept, up to 2^24
-    counts. `tell` takes sentences on what is left out or looks wrong. Raises `InputError` for counts that are
-    negative or fractional in any frame.
+    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, a .npy file
+    (N, H, W) or (H, W), or has no header (see `FrameFormat`); with {frame} in the pattern it is one frame.
+    For `pattern` and `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array,
+    or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
+    (K L, H, W) or (K L, N, H, W). Of frames in three channels each pixel keeps the colour of its filter in
+    `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
+    of each single count of frames of one bit is kept, up to 2^24 counts. `tell` takes sentences on what is
+    left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
     """
-    if width is not None and not bitpack:
-        raise InputError("--width: is for packed frames; give --bitpack too")
-    stacks = _stacks_of(source, pattern, grid, order, bitpack, tell)
+    stored.check()
+    stacks = _stacks_of(source, pattern, grid, order, stored, tell)
     name, first = stacks[0, 0].name, stacks[0, 0].load()
-    if first.ndim != 3 or 0 in first.shape or (bitpack and first.dtype != np.uint8):
-        expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if bitpack else "(T, H, W)"
+    if first.ndim not in (3, 4) or 0 in first.shape or (stored.bitpack and first.dtype != np.uint8):
+        expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if stored.bitpack else "(T, H, W)"
         raise InputError(f"{name}: expected frames {expected}, got {first.dtype} {first.shape}")
+    if first.ndim == 4 and (first.shape[3] != 3 or cfa is None):
+        raise InputError(
+            f"{name}: has {first.shape[3]} channels; photon counts have one, or three of which --cfa says "
+            "which one each pixel keeps"
+        )
     begin, stop = (0, len(first)) if frames is None else (frames[0], frames[1] + 1)
     if not 0 <= begin < stop <= len(first):
         raise InputError(
             f"{name}: has the frames 0 to {len(first) - 1}; expected two of them, the first and the last, "
             f"got {begin} and {stop - 1}"
         )
-    height, row = first.shape[1:]
-    if bitpack and width is not None and -(-width // 8) != row:
-        raise InputError(
-            f"{name}: its rows are of {8 * row - 7} to {8 * row} pixels, and the stated width is {width}; it "
-            "is wrong, or bits are packed along another axis"
-        )
-    if bitpack:
-        row = width or 8 * row
-    shape = (*stacks.shape, height, row)
+    shape = (*stacks.shape, first.shape[1], stored.width_of(name, first.shape[2]))
     camera_grid = optics.grid(shape) if isinstance(optics, Optics) else optics
     if camera_grid.shape_KLHW != shape:
         stated = f"{camera_grid.height} x {camera_grid.width}"
-        raise InputError(f"{name}: is {height} x {row} px, and {stated} are stated, rows x columns")
-    is_binary = bitpack or first.dtype == np.bool_
-    count = stop - begin
-    sums = np.zeros(camera_grid.shape_KLHW, np.min_scalar_type(count) if is_binary else np.uint64)
-    total, singles = 0, [np.empty((0, 5), np.int32)]
+        raise InputError(f"{name}: is {shape[2]} x {shape[3]} px, and {stated} are stated, rows x columns")
+    is_binary = stored.bitpack or first.dtype == np.bool_ or stored.bits == 1
+    total = _Sum(camera_grid, stop - begin, 1 if is_binary else stored.bits)
+    dead = stored.dead_pixels(camera_grid.shape_HW)
     for number, (camera, stack) in enumerate(np.ndenumerate(stacks)):
         array = stack.load()
         if (array.shape, array.dtype) != (first.shape, first.dtype):
             shapes = [f"{one.dtype} {one.shape}" for one in (array, first)]
             raise InputError(f"{stack.name}: has frames {shapes[0]}, where {name} has {shapes[1]}")
-        most = max(PIECE_BYTES // max(array[0].nbytes, 1), 1)
+        most = max(PIECE_BYTES // max(array[:1].nbytes, 1), 1)
         for start in range(begin, stop, most):
             piece = np.array(array[start : min(start + most, stop)])
             if isinstance(array, np.memmap):
                 array = stack.load()  # a new map, so that what was read leaves memory
-            if not is_binary:
-                if number == 0 and start == begin:
-                    _warn_of_packed_bytes(name, piece, tell)
-                    _warn_of_multiples(name, whole_counts(name, piece), tell)
-                sums[camera] += whole_counts(stack.name, piece).sum(axis=0, dtype=np.uint64)
-            else:
-                bits = np.unpackbits(piece, axis=2) if bitpack else piece.view(np.uint8)
-                if bits[:, :, row:].any():
-                    raise InputError(
-                        f"{stack.name}: bits beyond the {row} pixels of a row are set; the width is wrong, "
-                        "or bits are not packed along the width as numpy.packbits packs them"
-                    )
-                bits = bits[:, :, :row]
-                for low in range(0, len(bits), FRAMES_AT_ONCE):
-                    sums[camera] += np.add.reduce(bits[low : low + FRAMES_AT_ONCE], axis=0, dtype=np.uint8)
-                total += int(np.count_nonzero(bits))
-                if total <= MOST_KEPT:
-                    frame, i, j = np.nonzero(bits)
-                    k, l = (np.full(frame.size, index) for index in camera)
-                    singles.append(np.stack([k, l, i, j, frame + start - begin], axis=1).astype(np.int32))
+            if number == 0 and start == begin and stored in (AS_COUNTED, FrameFormat(mask=stored.mask)):
+                warn_of_numbers(name, piece, tell)
+            counts = stored.counts_of(stack.name, piece, dead)
+            if cfa is not None and counts.ndim == 4:
+                counts = mosaic(counts, cfa)
+            total.add(camera, start - begin, counts)
         report("views", number + 1, stacks.size)
-    if not is_binary:
-        return PhotonCounts.from_dense(sums, camera_grid, cfa=cfa, frames=count)
-    if bitpack:
-        _warn_of_dark_columns(sums, "--width" if isinstance(optics, Optics) else "w", tell)
-    if total > MOST_KEPT:
-        tell(
-            f"only the sums of {count} frames are kept: there are {total} counts, and the frame of each is "
-            f"kept for up to {MOST_KEPT}"
-        )
-        return PhotonCounts.from_dense(sums, camera_grid, cfa=cfa, frames=count, bits=1)
-    k, l, i, j, frame = np.concatenate(singles).T
-    n = np.ones(k.size, np.uint8)
-    return PhotonCounts.from_events(k, l, i, j, n, camera_grid, cfa=cfa, frames=count, bits=1, frame=frame)
+    if dead is not None:
+        tell(f"{np.count_nonzero(dead)} pixels of --mask count nothing")
+    if stored.bitpack:
+        warn_of_dark_columns(total.sums, "--width" if isinstance(optics, Optics) else "w", tell)
+        warn_of_bit_order(total.sums, stored.bit_order or "big", cfa, tell)
+    return total.photon_counts(cfa, name, tell)
 
 
-def _warn_of_packed_bytes(name: str, numbers: np.ndarray, tell: Tell) -> None:
-    """Warn of bytes whose high bits are set about as often as the low ones; in dim counts they are rarer."""
-    if numbers.dtype != np.uint8 or np.count_nonzero(numbers) < MIN_JUDGED_BYTES:
-        return
-    share = np.unpackbits(numbers[..., None], axis=-1).reshape(-1, 8).mean(axis=0)
-    if share.max() < 0.4 and share[:4].sum() > share.sum() / 3:
-        tell(f"warning: {name} looks like bits packed eight to a byte; if so, import again with --bitpack")
+class _Sum:
+    """The sums of frames, and as long as none counts more than 1 and they are few, the frame of each count.
 
+    `bits` are those of a frame, None if it may count without a limit.
+    """
 
-def _warn_of_multiples(name: str, numbers: np.ndarray, tell: Tell) -> None:
-    """Warn of counts that are all multiples of a number, such as of binary pictures of 0 and 255."""
-    step = int(np.gcd.reduce(numbers, axis=None))
-    if step > 1 and np.count_nonzero(numbers) * np.log(step) > 20:  # by chance it is one in e^20
-        tell(f"warning: all numbers of {name} are multiples of {step}; if that is one photon, divide by it")
+    def __init__(self, grid: CameraGrid, frames: int, bits: int | None) -> None:
+        self.grid, self.frames, self.bits = grid, frames, bits
+        most = np.iinfo(np.uint64).max if bits is None else frames * ((1 << bits) - 1)
+        self.sums = np.zeros(grid.shape_KLHW, np.min_scalar_type(most))
+        self.singles: list[np.ndarray] | None = [np.empty((0, 5), np.int32)]
+        self.number, self.is_above_one = 0, False
 
+    def add(self, camera: tuple[int, ...], first: int, counts: np.ndarray) -> None:
+        """Add frames (T, H, W) of a camera, from the frame number `first` on."""
+        self.is_above_one |= self.bits != 1 and bool(counts.max(initial=0) > 1)
+        if self.is_above_one:
+            self.singles = None
+            self.sums[camera] += counts.sum(axis=0, dtype=np.uint64).astype(self.sums.dtype)
+            return
+        bits = counts.astype(np.uint8, copy=False)
+        for low in range(0, len(bits), FRAMES_AT_ONCE):
+            self.sums[camera] += np.add.reduce(bits[low : low + FRAMES_AT_ONCE], axis=0, dtype=np.uint8)
+        self.number += int(np.count_nonzero(bits))
+        if self.singles is not None and self.number <= MOST_KEPT:
+            frame, i, j = np.nonzero(bits)
+            k, l = (np.full(frame.size, index) for index in camera)
+            self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
 
-def _warn_of_dark_columns(sums: np.ndarray, option: str, tell: Tell) -> None:
-    """Warn of columns at the end of packed rows without a count in any view."""
-    columns = sums.sum(axis=(0, 1, 2), dtype=np.int64)
-    width, lit = columns.size, int(np.flatnonzero(columns).max(initial=-1)) + 1
-    if lit < width and columns.sum() >= MIN_COLUMN_MEAN * width:
-        is_padding = -(-lit // 8) == -(-width // 8)  # padding is less than a byte
-        advice = f"import again with {option} {lit}" if is_padding else "cut them off the frames"
-        what = f"the last {width - lit} columns of {width} have no count in any view"
-        tell(f"warning: {what}; if the camera has fewer, {advice}")
+    def photon_counts(self, cfa: str | None, name: str, tell: Tell) -> PhotonCounts:
+        """The counts; of numbers 0 and 1 alone in light that would give others as frames of one bit."""
+        if self.bits is None and not self.is_above_one:
+            expected = expected_above_one(self.number, self.sums.size * self.frames)
+            if expected > SURE_NATS:
+                tell(
+                    f"{name} is taken for frames of one bit: no pixel of a frame counts more than 1, where "
+                    f"{expected:.3g} would by chance; if they are not, give --bits 8"
+                )
+                self.bits = 1
+        options = {"cfa": cfa, "frames": self.frames, "bits": self.bits}
+        if self.bits != 1:
+            return PhotonCounts.from_dense(self.sums, self.grid, **options)
+        if self.singles is None or self.number > MOST_KEPT:
+            tell(
+                f"only the sums of {self.frames} frames are kept: there are {self.number} counts, and the "
+                f"frame of each is kept for up to {MOST_KEPT}"
+            )
+            return PhotonCounts.from_dense(self.sums, self.grid, **options)
+        k, l, i, j, frame = np.concatenate(self.singles).T
+        n = np.ones(k.size, np.uint8)
+        return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
 
 
 def _by_camera(
@@ -216,27 +217,45 @@ def _by_camera(
     return numbers.reshape(*order.table_of(name, numbers.shape[0], grid), *numbers.shape[1:])
 
 
-def _frames_of(path: Path) -> np.ndarray:
-    """The frames (T, H, row) of a view: pages of a picture, or a .npy file, which is mapped into memory."""
+def _frames_of(stored: FrameFormat, path: Path) -> np.ndarray:
+    """The frames (T, H, row[, 3]) of a view: pages of a picture, or a file that is mapped into memory."""
+    if stored.frame_size is not None:
+        return stored.frames_in(path)
     if is_picture(path):
-        return _without_colours(path, np.stack([*decode(picture_of(path, EXACT))]))
+        return _of_one_channel(np.stack([*decode(picture_of(path, EXACT))]))
     numbers = map_array(path)
-    numbers = numbers[None] if numbers.ndim == 2 else numbers
-    return numbers[..., 0] if numbers.ndim == 4 and numbers.shape[3] == 1 else numbers  # one channel
+    return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
 
 
-def _without_colours(path: Path, pixels: np.ndarray) -> np.ndarray:
-    """Pixels (..., H, W) of pages (..., H, W, 1)."""
-    if pixels.shape[-1] != 1:
-        raise InputError(f"{path}: has {pixels.shape[-1]} channels; photon counts have one")
-    return pixels[..., 0]
+def _of_one_channel(frames: np.ndarray) -> np.ndarray:
+    """Frames without the axis of their channels, if there is one channel."""
+    return frames[..., 0] if frames.ndim >= 4 and frames.shape[-1] == 1 else frames
 
 
 class FrameStack(NamedTuple):
-    """The frames of a view: `load` returns them, (T, H, row), in memory or mapped from a file `name`."""
+    """The frames of a view: `load` returns them, (T, H, row[, 3]), in memory or mapped from a file `name`."""
 
     name: str
-    load: Callable[[], np.ndarray]
+    load: "Callable[[], np.ndarray | FrameFiles]"
+
+
+class FrameFiles:
+    """Files (T,) of a frame each as an array (T, H, row[, 3]), of which slices of frames are read."""
+
+    def __init__(self, stored: FrameFormat, paths: Sequence[Path]) -> None:
+        self.stored, self.paths = stored, paths
+        first = self[:1]
+        self.shape, self.ndim, self.dtype = (len(paths), *first.shape[1:]), first.ndim, first.dtype
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __getitem__(self, some: slice) -> np.ndarray:
+        frames = [_frames_of(self.stored, path) for path in self.paths[some]]
+        for path, frame in zip(self.paths[some], frames, strict=True):
+            if frame.shape != (1, *frames[0].shape[1:]) or frame.dtype != frames[0].dtype:
+                raise InputError(f"{path}: expected one frame as in {self.paths[0].name}")
+        return np.concatenate(frames)
 
 
 def _stacks_of(
@@ -244,7 +263,7 @@ def _stacks_of(
     pattern: str | None,
     grid: tuple[int, int] | None,
     order: ViewOrder,
-    bitpack: bool,
+    stored: FrameFormat,
     tell: Tell,
 ) -> np.ndarray:
     """The frames of each view, (K, L) of `FrameStack`."""
@@ -254,24 +273,29 @@ def _stacks_of(
         paths = order.arrange(np.asarray(paths))
         stacks = np.empty(paths.shape, object)
         for camera, path in np.ndenumerate(paths):
-            stacks[camera] = FrameStack(str(path), partial(_frames_of, path))
+            if isinstance(path, tuple):
+                stacks[camera] = FrameStack(str(path[0]), partial(FrameFiles, stored, path))
+            else:
+                stacks[camera] = FrameStack(str(path), partial(_frames_of, stored, path))
         return stacks
+    if stored.frame_size is not None:
+        raise InputError(f"{source}: --frame-size is for a folder of files without a header and --pattern")
     if not isinstance(source, np.ndarray) and is_picture(Path(source)):
         _, pages = pages_of(Path(source), grid, order, tell)
-        source, grid, order = _without_colours(Path(source), pages), None, AS_STORED
+        source, grid, order = _of_one_channel(pages), None, AS_STORED
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
 
     def arrange(numbers: np.ndarray) -> np.ndarray:
         views = order.arrange(_by_camera(numbers, name, grid, order, "[T,] H, W"))
-        return views[:, :, None] if views.ndim == 4 and not bitpack else views
+        return views[:, :, None] if views.ndim == 4 and not stored.bitpack else views
 
     def load(camera: tuple[int, int]) -> np.ndarray:
         return arrange(source if isinstance(source, np.ndarray) else map_array(Path(source)))[camera]
 
     views = arrange(numbers)
-    if views.ndim != 5 or 0 in views.shape:
-        shape = "(K, L, T, H, W / 8) of packed bits" if bitpack else "(K, L, H, W) or (K, L, N, H, W)"
+    if views.ndim not in (5, 6) or 0 in views.shape:
+        shape = "(K, L, T, H, W / 8) of packed bits" if stored.bitpack else "(K, L, H, W) or (K, L, N, H, W)"
         raise InputError(f"{name}: expected {shape}, or with --grid one axis of views, got {numbers.shape}")
     if grid is None and numbers.ndim == 4 and numbers.shape[3] in (3, 4):
         raise InputError(f"{name}: has the shape {numbers.shape}, with colours last; photon counts have none")
@@ -279,18 +303,3 @@ def _stacks_of(
     for camera in np.ndindex(*stacks.shape):
         stacks[camera] = FrameStack(name, partial(load, camera))
     return stacks
-
-
-def map_array(path: Path) -> np.ndarray:
-    """The array of a .npy file, mapped into memory; `InputError` for any other file."""
-    try:
-        numbers = np.load(path, mmap_mode="r", allow_pickle=False)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
-    except MemoryError:
-        raise
-    except Exception:  # damaged headers raise various exceptions
-        raise InputError(f"{path}: not an array of numbers in a .npy file, as numpy.save writes it") from None
-    if not isinstance(numbers, np.ndarray):
-        raise InputError(f"{path}: is an archive; save a .npy file, which is read piece by piece")
-    return numbers

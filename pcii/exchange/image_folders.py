@@ -1,6 +1,7 @@
 """Elemental images from pictures: a file a view, a TIFF file with a page a view, a picture of a lens array.
 
-A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text.
+A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text. Of
+photon counts {frame} too, if each file holds one frame.
 """
 
 import math
@@ -30,7 +31,7 @@ from pcii.types.truth import Truth
 
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
 """Kinds of pictures of views."""
-FIELD = re.compile(r"\{(row|col|index)(?::((?:0[1-9])?d?))?\}")
+FIELD = re.compile(r"\{(row|col|index|frame)(?::((?:0[1-9])?d?))?\}")
 MOST_VIEWS = 100_000
 MOST_NAMED = 3
 """Largest number of files that a sentence names."""
@@ -67,6 +68,8 @@ def import_images(
         radiance = radiance_of(*pages_of(path, grid, order, tell), encoding)
     else:
         files = order.arrange(files_by_camera(path, pattern, grid, order, tell))
+        if isinstance(files[0, 0], tuple):
+            raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
         radiance = radiance_of_files(files, encoding, report, tell)
     return views_of(radiance, optics, cfa)
 
@@ -144,6 +147,7 @@ def files_by_camera(
 ) -> np.ndarray:
     """Paths (A, B), object, of the files in `folder` that fit the pattern, in the order of their numbers.
 
+    With {frame} each is a tuple of paths, those of the frames of a view.
     Axes are {row} and {col}; the numbers of {index} count along the table in which the `order` stores a
     `grid`. Numbers may begin anywhere and have a sign; endings in capitals fit too. Raises `InputError` for a
     pattern that is none, for files that are missing and for two of one view; `tell` takes the names of other
@@ -152,7 +156,7 @@ def files_by_camera(
     expression, names = _expression(pattern)
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder of pictures")
-    files: dict[tuple[int, ...], Path] = {}
+    files: dict[tuple[int, ...], dict[int, Path]] = {}
     others: list[str] = []
     for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
         name = path.relative_to(folder).as_posix()
@@ -161,9 +165,10 @@ def files_by_camera(
             others += [name] if path.is_file() and not path.name.startswith(".") else []
             continue
         view = tuple(int(match[name]) for name in names)
-        if view in files:
-            raise InputError(f"{path}: is of the same view as {files[view].name}")
-        files[view] = path
+        frame = int(match["frame"]) if "frame" in expression.groupindex else 0
+        if frame in (of_view := files.setdefault(view, {})):
+            raise InputError(f"{path}: is of the same view as {of_view[frame].name}")
+        of_view[frame] = path
     if not files:
         hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
         raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
@@ -191,7 +196,9 @@ def files_by_camera(
         numbers_of = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
         raise InputError(f"{folder}: {count} of {table[0]} x {table[1]} views missing, first {numbers_of}")
     paths = np.empty(len(files), dtype=object)
-    paths[:] = [files[view] for view in sorted(files)]
+    for place, view in enumerate(sorted(files)):
+        ordered = tuple(files[view][frame] for frame in sorted(files[view]))
+        paths[place] = ordered if "frame" in expression.groupindex else ordered[0]
     return paths.reshape(table)
 
 
@@ -206,10 +213,12 @@ def listed_names(names: Sequence[str]) -> str:
 
 
 def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
-    """The regular expression of file names, and the names of its numbers: row and col, or index."""
-    names = tuple(sorted((match[1] for match in FIELD.finditer(str(pattern))), reverse=True))
+    """The regular expression of file names, and the names of the numbers of a view: row and col, or index."""
+    fields = [match[1] for match in FIELD.finditer(str(pattern))]
+    names = tuple(sorted((name for name in fields if name != "frame"), reverse=True))
     steps = PurePosixPath(str(pattern)).parts
     strange = not steps or str(pattern).startswith("/") or ".." in steps or "\0" in str(pattern)
+    strange |= fields.count("frame") > 1
     if strange or names not in (("index",), ("row", "col")) or {*FIELD.sub("", pattern)} & {*"{}"}:
         raise InputError(
             f'pattern: expected {{row}} and {{col}}, or {{index}}, as in "{{col}}_{{row}}.png" or '

@@ -13,6 +13,7 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.progress import Report
 from pcii.exchange.count_arrays import import_arrays, import_counts
+from pcii.exchange.frame_formats import FrameFormat
 from pcii.exchange.hci_scenes import PARAMETERS, import_hci
 from pcii.exchange.image_folders import (
     KnownViews,
@@ -103,6 +104,7 @@ GROUPS: dict[str, type[Any]] = {
     "order": ViewOrder,
     "lenses": Lenses,
     "encoding": PictureLight,
+    "stored": FrameFormat,
 }
 """Parameters of readers that stand for the options of a group."""
 
@@ -111,7 +113,8 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
     """The reader of a source; `InputError` for a source that is not there, or a folder without a pattern."""
     if not source.exists():
         raise InputError(f"{source}: there is no such file or folder")
-    pattern, is_counts = options["pattern"], options["counts"] or options["bitpack"]
+    pattern = options["pattern"]
+    is_counts = any(options[name] for name in ("counts", "bits", "bitpack", "frame_size"))
     if pattern is None and options["lens_array"] is None:
         if transforms_in(source) is not None:
             has_cubes = read_transforms(source, tell=lambda sentence: None).has_cubes
@@ -153,7 +156,9 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
     for name, build in (("lenses", _lens_array), ("optics", _optics), ("encoding", _encoding)):
         if name in parameters:
             values[name] = build(options)
-    values["order"] = ViewOrder(**{field.name: options[field.name] for field in fields(ViewOrder)})
+    for name, group in (("order", ViewOrder), ("stored", FrameFormat)):
+        if name in parameters:
+            values[name] = group(**{field.name: options[field.name] for field in fields(group)})
     result = reader(source, **{name: values[name] for name in parameters})
     known = result if isinstance(result, KnownViews) else None
     encoding = f", decoded by {values['encoding']}" if values.get("encoding") else ""

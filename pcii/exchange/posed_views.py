@@ -4,7 +4,7 @@ The frames of a transforms.json may be in any order and the rig anywhere in the 
 those of the pictures.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.export_pictures import MM_PER_M
+from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat, map_array
 from pcii.exchange.image_folders import radiance_of_files, views_of
 from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.stated_cameras import Tell, warn
@@ -88,15 +89,16 @@ def import_posed_cubes(
     sensor_mm: float | None = None,
     cfa: str | None = None,
     frames: tuple[int, int] | None = None,
-    bitpack: bool = False,
+    stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
     tell: Tell = warn,
 ) -> PhotonCounts:
     """Photon counts of the photon cubes that a transforms.json names, whose cameras are those of pictures.
 
-    A cube is (T, H, W) or, if the file or `bitpack` says so, packed, uint8 (T, H, W / 8); an axis of one
-    channel may follow. `frames` are the first and the last to add up; `cfa` is the Bayer pattern where the
-    file has none. Raises `InputError`, naming the file, for cubes that differ from what it says.
+    A cube is (T, H, W) or, if the file or `stored` says so, packed, uint8 (T, H, W / 8); an axis of one
+    channel may follow, or of three of which `cfa` says the one that each pixel keeps. `frames` are the first
+    and the last to add up; `cfa` is the Bayer pattern where the file has none. Raises `InputError`, naming
+    the file, for cubes that differ from what it says.
     """
     file = read_transforms(source, tell=tell)
     if file.cfa is not None and cfa not in (None, file.cfa):
@@ -104,10 +106,14 @@ def import_posed_cubes(
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
     paths = np.array(file.file_paths, object)[poses.numbers]
-    is_packed = bitpack or file.is_bitpacked
-    width = grid.width if is_packed else None
+    first = map_array(paths[0, 0])
+    channels = first.shape[3] if first.ndim == 4 else 1
+    if file.channels not in (None, channels):
+        raise InputError(f"{file.path}: c: is {file.channels}, and {paths[0, 0]} has {channels} channels")
+    if stored.bitpack or file.is_bitpacked:
+        stored = replace(stored, bitpack=True, width=grid.width)
     options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "tell": tell}
-    return import_counts(paths, grid, bitpack=is_packed, width=width, **options)
+    return import_counts(paths, grid, stored=stored, **options)
 
 
 def camera_grid_of(

@@ -79,6 +79,7 @@ class _Document(_Lens):
     file_path: str | None = None
     bitpack: bool | None = None
     bitpack_dim: int | None = None
+    c: Annotated[int, Field(ge=1, le=4)] | None = None
     cfa: str | None = None
 
 
@@ -99,6 +100,8 @@ class TransformsFile:
     has_cubes: bool
     is_bitpacked: bool
     """Whether cubes have eight pixels in a byte."""
+    channels: int | None
+    """Channels of photon cubes, None if the file does not say."""
     cfa: str | None
     """Bayer pattern of photon cubes, None if the file has none."""
 
@@ -158,8 +161,8 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
             raise InputError(f"{file}: frames: the camera moves, and a moving camera is no grid")
         poses, centres_px = poses[:1], centres_px[:1]
     unused = {**(document.model_extra or {}), **{name: 0 for f in frames for name in f.model_extra or {}}}
-    if document.cfa is not None and not has_cubes:
-        unused["cfa"] = document.cfa
+    if not has_cubes:
+        unused |= {name: 0 for name in ("cfa", "c") if getattr(document, name) is not None}
     if unused:
         tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
@@ -172,6 +175,7 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
         file_paths=tuple(paths),
         has_cubes=has_cubes,
         is_bitpacked=document.bitpack is True,
+        channels=document.c,
         cfa=None if document.cfa == "none" else document.cfa,
     )
 

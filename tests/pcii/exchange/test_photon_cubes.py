@@ -12,7 +12,7 @@ from command_runs import check_refused, run
 from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
-from pcii import CameraGrid, InputError, ViewOrder, import_counts, open_dataset
+from pcii import CameraGrid, FrameFormat, InputError, ViewOrder, import_counts, open_dataset
 from pcii.exchange import count_arrays
 from pcii.types.photon_counts import PhotonCounts
 
@@ -22,6 +22,7 @@ EIGHTS = CameraGrid(
     rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=4, width=16, shear_px=(1.5, 0)
 )
 BITS = bits_of(GRID)
+PACKED = FrameFormat(bitpack=True)
 
 
 def files_of(folder: Path, bits: np.ndarray) -> Path:
@@ -41,7 +42,8 @@ def test_sums_and_frames_are_those_of_unpacked_bits(shape: tuple[int, int, int],
 def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
     """Counts of packed frames in memory."""
     frames, width = (span[0], span[1] - 1), bits.shape[4]
-    return import_counts(packed(bits), OPTICS, frames=frames, bitpack=True, width=width, tell=[].append)
+    stored = FrameFormat(bitpack=True, width=width)
+    return import_counts(packed(bits), OPTICS, frames=frames, stored=stored, tell=[].append)
 
 
 def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
@@ -89,7 +91,7 @@ def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kept", ["files", "one file", "counted file"])
 def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     pattern, source = None, tmp_path / "all.npy"
-    options: dict[str, Any] = {"bitpack": True, "width": 13, "tell": [].append}
+    options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "tell": [].append}
     if kept == "files":
         pattern, source = "{row}_{col}.npy", files_of(tmp_path / "views", BITS)
     elif kept == "one file":
@@ -122,7 +124,7 @@ def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None
 def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
     bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
-    import_counts(packed(bits), OPTICS, bitpack=True, width=width, tell=told.append)
+    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), tell=told.append)
     words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
     assert told == ([] if advice is None else [words])
 
@@ -160,4 +162,4 @@ def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make, options, wor
 def test_a_view_of_other_frames_is_refused(tmp_path: Path) -> None:
     np.save(files_of(tmp_path / "views", BITS) / "1_0.npy", packed(BITS[1, 0])[1:])
     with pytest.raises(InputError, match=r"1_0.npy: has frames uint8 .8, 11, 2., where .*0_0.npy"):
-        import_counts(tmp_path / "views", OPTICS, pattern="{row}_{col}.npy", bitpack=True)
+        import_counts(tmp_path / "views", OPTICS, pattern="{row}_{col}.npy", stored=PACKED)

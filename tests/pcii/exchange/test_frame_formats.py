@@ -1,0 +1,217 @@
+"""Frames as sensors keep them: what they are is said or recognised, and what looks wrong is named."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from command_runs import check_refused, run
+from picture_folders import OPTICS
+from PIL import Image
+
+import pcii
+from pcii import FrameFormat, InputError, import_counts
+from pcii.exchange.frame_formats import SURE_NATS, expected_above_one
+from pcii.types.bayer import mosaic
+
+CAMERAS = ["--pitch-mm", 2, 2, "--focal-mm", 35, "--pixel-mm", 0.45]
+H, W, FRAMES = 12, 32, 20
+RNG = np.random.default_rng(5)
+BITS = RNG.random((2, 2, FRAMES, H, W)) < 0.3
+
+
+def told_of(source: Any, **options: Any) -> tuple[pcii.PhotonCounts, list[str]]:
+    told: list[str] = []
+    return import_counts(source, OPTICS, tell=told.append, **options), told
+
+
+def test_frames_of_0_and_1_are_frames_of_one_bit() -> None:
+    of_bits, told = told_of(BITS)
+    assert told == []
+    counts, told = told_of(BITS.astype(np.uint8))
+    assert [sentence.split(":")[0] for sentence in told] == ["array is taken for frames of one bit"]
+    assert counts.readout == of_bits.readout == pcii.import_counts(BITS, OPTICS).readout
+    np.testing.assert_array_equal(counts.frame, of_bits.frame)
+    np.testing.assert_array_equal(pcii.reconstruct(counts, 90).counts, pcii.reconstruct(of_bits, 90).counts)
+    counts, told = told_of(BITS.astype(np.uint8), stored=FrameFormat(bits=8))
+    assert (told, counts.readout.bits) == ([], 8)
+    dim = np.zeros(BITS.shape, np.uint8)
+    dim[..., 0, :3] = 1  # of 240 in 30 720 numbers 0.94 would be above 1 by chance
+    counts, told = told_of(dim)
+    assert (told, counts.readout.bits) == ([], None)
+
+
+def test_numbers_above_one_that_light_would_give() -> None:
+    light = np.random.default_rng(1).poisson(0.1, 1_000_000)
+    expected = expected_above_one(int((light > 0).sum()), light.size)
+    assert expected == pytest.approx((light > 1).sum(), rel=0.05)
+    assert expected_above_one(10, 10) == 10
+    assert expected_above_one(0, 10) == 0 < SURE_NATS
+
+
+@pytest.mark.parametrize("bits", [2, 4, 12])
+def test_frames_of_a_few_bits_saturate(bits: int) -> None:
+    most = 2**bits - 1
+    stored = np.minimum(RNG.poisson(0.95 * most, (2, 2, FRAMES, H, W)), most).astype(np.uint16)
+    counts, _ = told_of(stored, stored=FrameFormat(bits=bits))
+    assert counts.readout == type(counts.readout)(FRAMES, bits)
+    np.testing.assert_array_equal(counts.dense, stored.sum(axis=2))
+    with pytest.raises(InputError, match=f"counts to {most}, and --bits {bits - 1} hold {most // 2}"):
+        told_of(stored, stored=FrameFormat(bits=bits - 1))
+
+
+def smooth_bits(seed: int) -> np.ndarray:
+    """Frames of bits of light that changes slowly from pixel to pixel."""
+    rng, x = np.random.default_rng(seed), np.arange(64) / 64
+    light = sum(np.cos(6.28 * (f * x + p)) for f, p in zip(rng.uniform(1, 5, 8), rng.random(8), strict=True))
+    return rng.random((2, 2, 60, 48, 64)) < 0.1 + 0.02 * light
+
+
+@pytest.mark.parametrize("cfa", [None, "GRBG"])
+@pytest.mark.parametrize("order", ["big", "little"])
+def test_the_order_of_bits_is_an_option_and_the_wrong_one_is_named(order: Any, cfa: str | None) -> None:
+    bits, other = smooth_bits(3), "little" if order == "big" else "big"
+    packed = np.packbits(bits, axis=4, bitorder=order)
+    counts, told = told_of(packed, stored=FrameFormat(bitpack=True, bit_order=order), cfa=cfa)
+    np.testing.assert_array_equal(counts.dense, bits.sum(axis=2))
+    assert told == []
+    _, told = told_of(packed, stored=FrameFormat(bitpack=True, bit_order=other), cfa=cfa)
+    assert [sentence.split("--")[-1] for sentence in told] == [f"bit-order {order}"]
+
+
+def test_wrong_numbers_are_named_before_cameras_are_blamed(tmp_path: Path, capsys: Any) -> None:
+    np.save(tmp_path / "in.npy", np.packbits(smooth_bits(3), axis=4, bitorder="little"))
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", "--bitpack", *CAMERAS) == 0
+    said = capsys.readouterr().out
+    assert "--bit-order little" in said
+    assert "fit together" not in said
+
+
+def test_hot_pixels_are_counted(tmp_path: Path, capsys: Any) -> None:
+    counts = np.random.default_rng(4).poisson(1.0, (3, 3, 32, 32))
+    counts[..., 3, 4] = counts[..., 20, 9] = 40
+    np.save(tmp_path / "in.npy", counts.astype(np.uint16))
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", "--counts", *CAMERAS) == 0
+    assert "2 of 1024 pixels are far brighter than all around them in most views" in capsys.readouterr().out
+
+
+def test_bits_of_noise_are_in_no_order() -> None:
+    for seed in range(20):
+        bits = np.random.default_rng(seed).random((2, 2, 20, 16, 64)) < 0.2
+        assert told_of(np.packbits(bits, axis=4), stored=FrameFormat(bitpack=True))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("stored", "number"),
+    [
+        (FrameFormat(bitpack=True, frame_size=(W - 3, H)), "u1"),
+        (FrameFormat(frame_size=(W, H), skip_bytes=(16, 3)), "u1"),
+        (FrameFormat(frame_size=(W, H), skip_bytes=(0, 2), bits=12), "<u2"),
+    ],
+)
+def test_files_without_a_header(tmp_path: Path, stored: FrameFormat, number: str) -> None:
+    (width, height), (before, after) = stored.frame_size or (0, 0), stored.skip_bytes or (0, 0)
+    frames = RNG.poisson(0.9, (2, 2, FRAMES, height, width)).clip(max=1 if stored.bitpack else 4095)
+    for k, l in np.ndindex(2, 2):
+        parts = np.packbits(frames[k, l], axis=2) if stored.bitpack else frames[k, l].astype(number)
+        content = b"".join(b"x" * before + part.tobytes() + b"y" * after for part in parts)
+        (tmp_path / f"{k}_{l}.bin").write_bytes(content)
+    counts, _ = told_of(tmp_path, pattern="{row}_{col}.bin", stored=stored)
+    np.testing.assert_array_equal(counts.dense, frames.sum(axis=2))
+    assert counts.readout.frames == FRAMES
+    (tmp_path / "0_0.bin").write_bytes((tmp_path / "1_1.bin").read_bytes()[1:])
+    with pytest.raises(InputError, match="bytes are no whole number of frames of"):
+        told_of(tmp_path, pattern="{row}_{col}.bin", stored=stored)
+
+
+def test_a_folder_of_frames_for_each_view(tmp_path: Path, capsys: Any) -> None:
+    for k, l, t in np.ndindex(2, 2, FRAMES):
+        (tmp_path / "in" / f"{k}_{l}").mkdir(parents=True, exist_ok=True)
+        Image.fromarray(BITS[k, l, t]).save(tmp_path / "in" / f"{k}_{l}" / f"{t:04d}.png")
+    command = ["import", tmp_path / "in", "--pattern", "{row}_{col}/{frame}.png", *CAMERAS]
+    assert run(*command, "--counts", "-o", tmp_path / "out") == 0
+    counts = pcii.open_dataset(tmp_path / "out").counts
+    assert (counts.readout.frames, counts.readout.bits) == (FRAMES, 1)
+    np.testing.assert_array_equal(counts.dense, BITS.sum(axis=2))
+    assert run(*command, "-o", tmp_path / "other") == 2
+    assert "{frame} is for frames of photon counts; give --counts too" in capsys.readouterr().err
+    (tmp_path / "in" / "1_0" / "0007.png").unlink()
+    check_refused(tmp_path / "in", tmp_path / "x", [*command[2:], "--counts"], "1_0/0000.png: has fr", capsys)
+
+
+def test_a_cube_in_three_channels_is_a_mosaic(tmp_path: Path, capsys: Any) -> None:
+    """As visionsim and the Single Photon Challenge have them."""
+    bits = np.random.default_rng(1).random((FRAMES, H, 16, 3)) < [0.02, 0.05, 0.1]
+    np.save(tmp_path / "frames.npy", np.packbits(bits, axis=2))
+    pose = {"transform_matrix": np.eye(4).tolist()}
+    text = {"fl_x": 20, "fl_y": 20, "cx": 8, "cy": 6, "w": 16, "h": H, "c": 3, "bitpack": True}
+    text |= {"file_path": "frames.npy", "frames": [pose] * FRAMES}
+    (tmp_path / "transforms.json").write_text(json.dumps(text))
+    assert run("import", tmp_path, "-o", tmp_path / "out", "--focal-mm", 50, "--cfa", "RGGB") == 0
+    assert "not used" not in capsys.readouterr().out
+    dataset = pcii.open_dataset(tmp_path / "out")
+    np.testing.assert_array_equal(dataset.counts.view(0, 0), mosaic(bits.sum(axis=0), "RGGB"))
+    words = "has 3 channels; photon counts have one, or three of which --cfa says"
+    check_refused(tmp_path, tmp_path / "a", ["--focal-mm", 50], words, capsys)
+    (tmp_path / "transforms.json").write_text(json.dumps(text | {"c": 1}))
+    check_refused(tmp_path, tmp_path / "b", ["--focal-mm", 50], "c: is 1, and .* has 3 channels", capsys)
+
+
+def test_offset_and_gain_of_a_camera(tmp_path: Path) -> None:
+    photons = np.random.default_rng(9).poisson(0.05, (3, 3, 32, 32))
+    stored = np.round(100 + RNG.normal(0, 2, photons.shape) + 12 * photons).astype(np.uint16)
+    (_, told) = told_of(stored)
+    assert len(told) == 1
+    assert "no number of array is below 9" in told[0]
+    assert "--offset" in told[0]
+    counts, told = told_of(stored, stored=FrameFormat(offset=100, gain=12))
+    assert (counts.dense != photons).mean() < 0.005  # noise of 3 of its standard deviations is half a photon
+    assert told == []
+
+
+def test_marks_are_named_and_a_mask_leaves_them_out(tmp_path: Path) -> None:
+    stored = np.random.default_rng(9).poisson(0.05, (3, 3, 32, 32)).astype(np.uint32)
+    clean = stored.copy()
+    stored[..., 5, 5] = stored[..., 20, :] = 2**32 - 1
+    _, (sentence,) = told_of(stored)
+    assert sentence == (
+        "warning: 33 numbers of array are 4294967295: give --mask FILE if that marks dead pixels"
+    )
+    dead = np.zeros((32, 32), np.uint8)
+    dead[5, 5] = dead[20] = 255
+    np.save(tmp_path / "dead.npy", dead)
+    tifffile.imwrite(tmp_path / "dead.tif", dead)
+    for name in ("dead.npy", "dead.tif"):
+        counts, told = told_of(stored, stored=FrameFormat(mask=tmp_path / name))
+        np.testing.assert_array_equal(counts.dense, np.where(dead, 0, clean))
+        assert told[-1] == "33 pixels of --mask count nothing"
+    with pytest.raises(InputError, match=r"--mask: .* is \(32, 32\), and views are \(12, 32\)"):
+        told_of(BITS, stored=FrameFormat(mask=tmp_path / "dead.npy"))
+
+
+@pytest.mark.parametrize("mean", [0.01, 0.3, 3, 40, 1000])
+def test_photon_counts_of_any_light_are_not_warned_of(mean: float) -> None:
+    x = np.linspace(0, 6, 64)
+    for texture in (np.ones(64), 1 + 0.9 * np.sin(x)):
+        counts = np.random.default_rng(2).poisson(mean * texture, (2, 2, 3, 48, 64))
+        assert told_of(counts.astype(np.uint16))[1] == []
+
+
+REFUSED = [
+    ({"width": 8}, "--width: is for packed frames; give --bitpack too"),
+    ({"bit_order": "little"}, "--bit-order: is for packed frames"),
+    ({"skip_bytes": (1, 0)}, "--skip-bytes: is for files without a header; give --frame-size too"),
+    ({"bits": 17}, "--bits: expected 1 to 16, got 17"),
+    ({"bits": 2, "bitpack": True}, "--bits: expected 1 of packed frames, got 2"),
+    ({"gain": 0.0}, "--gain: expected a number above 0, got 0"),
+    ({"offset": 3.0, "bitpack": True}, "--offset, --gain: are for numbers"),
+    ({"frame_size": (0, 4)}, "--frame-size, --skip-bytes: expected at least one pixel"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), REFUSED)
+def test_formats_that_cannot_be_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=f"^{words}"):
+        import_counts(BITS, OPTICS, stored=FrameFormat(**options))
