@@ -43,6 +43,7 @@ def import_dataset(
     out: Out,
     pattern: str | None = None,
     grid: WholePair = None,
+    axes: str | None = None,
     counts: bool = False,
     frames: WholePair = None,
     stored: Annotated[FrameFormat, FLAT] = AS_COUNTED,
@@ -83,6 +84,10 @@ def import_dataset(
     grid
         Rows and columns of cameras, for {index}, for pages, and for arrays whose first axis counts the views.
         Default: square.
+    axes
+        Order of the axes of an array: K and L, rows and columns of cameras, or N, all views; T, frames; H and
+        W, rows and columns of pixels; C, colours. Such as HWKL. Default: KLHW, KLHWC, KLTHW, or with --grid N
+        in place of KL.
     counts
         The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
     frames
@@ -102,7 +107,7 @@ def import_dataset(
     """
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
-    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "counts": counts}
+    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "axes": axes, "counts": counts}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light, stored):
         options |= vars(group)

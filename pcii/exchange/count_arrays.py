@@ -35,6 +35,8 @@ PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
+AXES = "KLNTHWC"
+"""The order in which axes are understood: cameras or views, frames, pixels, colours."""
 FRAMES_AT_ONCE = 255
 """Their sum fits in a byte."""
 
@@ -47,22 +49,26 @@ def import_arrays(
     order: ViewOrder = AS_STORED,
     encoding: Encoding | None = None,
     cfa: str | None = None,
+    axes: str | None = None,
 ) -> Views:
     """Radiance of an array (K, L, H, W) or (K, L, H, W, C), C = 1 or 3, or of a .npy file of one.
 
-    With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C). Floats are linear, unless `encoding` says
+    With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C); or its `axes` are named, such as "HWKL", N
+    being views. Floats are linear, unless `encoding` says
     otherwise; whole numbers need it: they may be sRGB of pictures or linear values of a sensor, which the
     file does not tell. `cfa` is a Bayer pattern, of which arrays of one channel are mosaics. Raises
     `InputError` for what does not fit.
     """
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
-    views = order.arrange(_by_camera(numbers, name, grid, order, "H, W[, C]"))
+    views = order.arrange(_by_camera(numbers, name, grid, order, axes, "H, W[, C]"))
     if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
         raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
     if views.ndim == 4:
-        if grid is None and views.shape[3] in (3, 4):
-            raise InputError(f"{name}: has the shape {numbers.shape}; give --grid if it is (N, H, W, C)")
+        if grid is None and axes is None and views.shape[3] in (3, 4):
+            raise InputError(
+                f"{name}: has the shape {numbers.shape}; give --grid if it is (N, H, W, C), or --axes"
+            )
         views = views[..., None]
     if views.ndim != 5 or 0 in views.shape or views.shape[4] not in (1, 3):
         raise InputError(f"{name}: expected (K, L, H, W) or (K, L, H, W, 1 or 3), got {numbers.shape}")
@@ -86,6 +92,7 @@ def import_counts(
     grid: tuple[int, int] | None = None,
     order: ViewOrder = AS_STORED,
     cfa: str | None = None,
+    axes: str | None = None,
     frames: tuple[int, int] | None = None,
     stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
@@ -98,13 +105,14 @@ def import_counts(
     (N, H, W) or (H, W), or has no header (see `FrameFormat`); with {frame} in the pattern it is one frame.
     For `pattern` and `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array,
     or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
-    (K L, H, W) or (K L, N, H, W). Of frames in three channels each pixel keeps the colour of its filter in
+    (K L, H, W) or (K L, N, H, W); or its `axes` are named, such as "HWKL" or "NTHW", N being views and T
+    frames. Of frames in three channels each pixel keeps the colour of its filter in
     `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
     of each single count of frames of one bit is kept, up to 2^24 counts. `tell` takes sentences on what is
     left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
     """
     stored.check()
-    stacks = _stacks_of(source, pattern, grid, order, stored, tell)
+    stacks = _stacks_of(source, pattern, grid, order, axes, stored, tell)
     name, first = stacks[0, 0].name, stacks[0, 0].load()
     if first.ndim not in (3, 4) or 0 in first.shape or (stored.bitpack and first.dtype != np.uint8):
         expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if stored.bitpack else "(T, H, W)"
@@ -207,14 +215,50 @@ class _Sum:
 
 
 def _by_camera(
-    numbers: np.ndarray, name: str, grid: tuple[int, int] | None, order: ViewOrder, axes: str
+    numbers: np.ndarray,
+    name: str,
+    grid: tuple[int, int] | None,
+    order: ViewOrder,
+    axes: str | None,
+    ordinary: str,
 ) -> np.ndarray:
-    """An array as (A, B, ...), the table of views as stored; of a `grid` its first axis counts the views."""
-    if numbers.ndim < (4 if grid is None else 3):
-        raise InputError(f"{name}: expected (K, L, {axes}), or with --grid (N, {axes}), got {numbers.shape}")
-    if grid is None:
+    """An array as (A, B, ...), the table of views as stored, in the order of `AXES`.
+
+    Without `axes` it is in that order, and of a `grid` its first axis counts the views; `ordinary` are its
+    other axes in words. Raises `InputError` for other axes, and for more views than pixels in an order that
+    nobody has named.
+    """
+    if axes is None:
+        if numbers.ndim < (4 if grid is None else 3):
+            expected = f"(K, L, {ordinary}), or with --grid (N, {ordinary})"
+            raise InputError(f"{name}: expected {expected}, got {numbers.shape}")
+        axes = "KL" if grid is None else "N"
+        count = np.prod(numbers.shape[: len(axes)], dtype=np.int64)
+        is_known = numbers.ndim - len(axes) < 2 or numbers.shape[-1] in (3, 4)  # colours have a sentence
+        if not is_known and count > np.prod(numbers.shape[len(axes) :], dtype=np.int64):
+            raise InputError(
+                f"{name}: {numbers.shape} would be more views than each has numbers; name the order of its "
+                "axes with --axes, such as HWKL"
+            )
+    else:
+        numbers = _in_order(numbers, name, axes)
+    if "N" not in axes:
         return numbers
     return numbers.reshape(*order.table_of(name, numbers.shape[0], grid), *numbers.shape[1:])
+
+
+def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:
+    """An array whose axes are named, in the order of `AXES`; `InputError` for names that do not fit."""
+    names = {*axes}
+    is_known = len(names) == len(axes) and names <= {*AXES} and {*"HW"} <= names
+    if not is_known or (names & {*"KLN"}) not in ({*"KL"}, {"N"}):
+        raise InputError(
+            "--axes: expected each axis once, K and L (rows and columns of cameras) or N (views), "
+            f"T (frames), H and W (rows and columns of pixels), C (colours), such as HWKL; got {axes!r}"
+        )
+    if len(axes) != numbers.ndim:
+        raise InputError(f"{name}: has the shape {numbers.shape}, and --axes {axes} are {len(axes)} axes")
+    return numbers.transpose([axes.index(axis) for axis in AXES if axis in names])
 
 
 def _frames_of(stored: FrameFormat, path: Path) -> np.ndarray:
@@ -263,6 +307,7 @@ def _stacks_of(
     pattern: str | None,
     grid: tuple[int, int] | None,
     order: ViewOrder,
+    axes: str | None,
     stored: FrameFormat,
     tell: Tell,
 ) -> np.ndarray:
@@ -282,22 +327,24 @@ def _stacks_of(
         raise InputError(f"{source}: --frame-size is for a folder of files without a header and --pattern")
     if not isinstance(source, np.ndarray) and is_picture(Path(source)):
         _, pages = pages_of(Path(source), grid, order, tell)
-        source, grid, order = _of_one_channel(pages), None, AS_STORED
+        source, grid, order, axes = _of_one_channel(pages), None, AS_STORED, None
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
 
     def arrange(numbers: np.ndarray) -> np.ndarray:
-        views = order.arrange(_by_camera(numbers, name, grid, order, "[T,] H, W"))
-        return views[:, :, None] if views.ndim == 4 and not stored.bitpack else views
+        views = order.arrange(_by_camera(numbers, name, grid, order, axes, "[T,] H, W"))
+        has_frames = "T" in axes if axes else views.ndim > 4 or stored.bitpack
+        return views if has_frames else views[:, :, None]
 
     def load(camera: tuple[int, int]) -> np.ndarray:
-        return arrange(source if isinstance(source, np.ndarray) else map_array(Path(source)))[camera]
+        views = arrange(source if isinstance(source, np.ndarray) else map_array(Path(source)))
+        return _of_one_channel(views[camera])
 
     views = arrange(numbers)
     if views.ndim not in (5, 6) or 0 in views.shape:
         shape = "(K, L, T, H, W / 8) of packed bits" if stored.bitpack else "(K, L, H, W) or (K, L, N, H, W)"
         raise InputError(f"{name}: expected {shape}, or with --grid one axis of views, got {numbers.shape}")
-    if grid is None and numbers.ndim == 4 and numbers.shape[3] in (3, 4):
+    if grid is None and axes is None and numbers.ndim == 4 and numbers.shape[3] in (3, 4):
         raise InputError(f"{name}: has the shape {numbers.shape}, with colours last; photon counts have none")
     stacks = np.empty(views.shape[:2], object)
     for camera in np.ndindex(*stacks.shape):

@@ -296,6 +296,38 @@ def import_lens_array(
     return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
 
 
+def import_interlaced(
+    path: str | Path,
+    interlaced: tuple[int, int],
+    optics: Optics,
+    *,
+    order: ViewOrder = AS_STORED,
+    encoding: Encoding | None = None,
+    cfa: str | None = None,
+    tell: Tell = warn,
+) -> Views:
+    """Radiance of a picture that has a pixel of each view in every block of `interlaced` (K, L) pixels.
+
+    So light field cameras store what is under each micro lens, and archives their views (ESLF). `optics` are
+    those of views; `sensor_mm` is the width of the whole picture. Raises `InputError` for a picture of no
+    whole number of blocks, and for a mosaic.
+    """
+    picture = picture_of(Path(path), VIEWS)
+    if picture.pages > 1:
+        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
+    _tell_unused([(Path(path), picture.unused)], tell)
+    (height, width, channels), (rows, cols) = picture.shape, interlaced
+    if min(rows, cols) < 1 or height % rows or width % cols:
+        raise InputError(
+            f"{path}: {height} x {width} px are no whole blocks of --interlaced {rows} {cols}, rows x columns"
+        )
+    if cfa is not None and channels == 1:
+        raise InputError(f"{path}: is a mosaic, whose pattern interlaced views break; give it in colours")
+    whole = radiance_of(picture, next(decode(picture)), encoding)
+    blocks = whole.reshape(height // rows, rows, width // cols, cols, channels)
+    return views_of(np.ascontiguousarray(order.arrange(blocks.transpose(1, 3, 0, 2, 4))), optics, cfa)
+
+
 def _starts(count: int, pitch: float, offset: float, size: int, how: str, path: str | Path) -> np.ndarray:
     """Where the images of the lenses of an axis begin, (count,), in px."""
     first = offset + (pitch - math.floor(pitch)) / 2

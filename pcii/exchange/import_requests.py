@@ -19,6 +19,7 @@ from pcii.exchange.image_folders import (
     KnownViews,
     LensArray,
     import_images,
+    import_interlaced,
     import_lens_array,
     is_picture,
 )
@@ -63,6 +64,8 @@ class Lenses:
     """Left upper corner of the first lens image, x and y. Default: 0 0."""
     inverted: bool = False
     """Each lens image is upside down, as a sensor right behind the lenses sees it."""
+    interlaced: WholePair = None
+    """Rows and columns of views of which a picture has a pixel each in every block, as under a micro lens."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +95,7 @@ class Imported:
 READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
     import_images: ("pictures", ()),
     import_lens_array: ("a picture of a lens array", ()),
+    import_interlaced: ("a picture of interlaced views", ()),
     import_arrays: ("an array of light", ()),
     import_counts: ("photon counts", ("counts",)),
     import_hci: ("a scene of the HCI 4D light field benchmark", ()),
@@ -131,6 +135,8 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
         raise InputError(f"{source}: --pattern is for a folder, and this is a file")
     if options["lens_array"] is not None:
         return import_lens_array
+    if options["interlaced"] is not None:
+        return import_interlaced
     if is_counts:
         return import_counts
     return import_images if source.is_dir() or is_picture(source) else import_arrays

@@ -215,3 +215,57 @@ REFUSED = [
 def test_formats_that_cannot_be_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=f"^{words}"):
         import_counts(BITS, OPTICS, stored=FrameFormat(**options))
+
+
+@pytest.mark.parametrize("axes", ["HWKL", "LKWH", "HWN", "NHW"])
+def test_the_axes_of_an_array_are_named(tmp_path: Path, axes: str) -> None:
+    counts = np.random.default_rng(3).poisson(2.0, (2, 3, H, W))
+    named = {"K": 0, "L": 1, "H": 2, "W": 3}
+    stored = counts.transpose([named[axis] for axis in axes]) if "N" not in axes else counts.reshape(6, H, W)
+    stored = stored.transpose(1, 2, 0) if axes == "HWN" else stored
+    grid = (2, 3) if "N" in axes else None
+    np.save(tmp_path / "in.npy", stored)
+    for source in (stored, tmp_path / "in.npy"):
+        found = import_counts(source, OPTICS, grid=grid, axes=axes)
+        np.testing.assert_array_equal(found.dense, counts)
+    views = pcii.import_arrays(stored.astype(np.float32), OPTICS, grid=grid, axes=axes)
+    np.testing.assert_array_equal(views.radiance[..., 0], counts)
+
+
+def test_a_picture_of_interlaced_views(tmp_path: Path, capsys: Any) -> None:
+    views = np.random.default_rng(3).integers(0, 256, (2, 4, H, W, 3), np.uint8)
+    picture = views.transpose(2, 0, 3, 1, 4).reshape(2 * H, 4 * W, 3)
+    Image.fromarray(picture).save(tmp_path / "lenses.png")
+    command = [tmp_path / "lenses.png", "--pitch-mm", 2, 2, "--focal-mm", 35, "--sensor-mm", 16]
+    assert run("import", *command, "-o", tmp_path / "out", "--interlaced", 2, 4, "--linear") == 0
+    dataset = pcii.open_dataset(tmp_path / "out")
+    assert dataset.views is not None
+    assert dataset.grid.pixel_mm == pytest.approx(16 / W)
+    np.testing.assert_allclose(np.asarray(dataset.views.radiance), views / 255, atol=1e-6)
+    options = [*command[1:], "--interlaced", 5, 4]
+    check_refused(command[0], tmp_path / "x", options, "24 x 128 px are no whole blocks", capsys)
+
+
+def test_frames_and_colours_have_axes_of_their_own() -> None:
+    frames = np.random.default_rng(3).random((H, W, 3, 2, 2, FRAMES)) < 0.2
+    counts = import_counts(frames, OPTICS, axes="HWCKLT", cfa="GRBG")
+    expected = mosaic(frames.sum(axis=5).transpose(3, 4, 0, 1, 2), "GRBG")
+    np.testing.assert_array_equal(counts.dense, expected)
+    radiance = np.random.default_rng(3).random((3, H, W, 2, 2))
+    views = pcii.import_arrays(radiance, OPTICS, axes="CHWKL")
+    np.testing.assert_allclose(np.asarray(views.radiance), radiance.transpose(3, 4, 1, 2, 0), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "axes", "words"),
+    [
+        ((40, 48, 5, 5), None, "would be more views than each has numbers; name the order .* such as HWKL"),
+        ((40, 48, 3, 3), "HWK", "--axes: expected each axis once, K and L"),
+        ((40, 48, 3, 3), "HWKK", "--axes: expected each axis once"),
+        ((40, 48, 3), "HWKL", r"has the shape \(40, 48, 3\), and --axes HWKL are 4 axes"),
+    ],
+)
+def test_axes_that_do_not_fit_are_refused(shape: tuple[int, ...], axes: str | None, words: str) -> None:
+    for read in (import_counts, pcii.import_arrays):
+        with pytest.raises(InputError, match=words):
+            read(np.ones(shape), OPTICS, axes=axes)
