@@ -211,3 +211,12 @@ def test_the_terms_of_the_guide_to_exchange_are_valid() -> None:
     values: dict[str, Any] = {"scene": "blank"}
     override(values, ["publication.licence=CC0-1.0"])
     assert Recipe.model_validate(values).publication.terms().licence == "CC0-1.0"
+
+
+def test_sentences_that_the_guide_explains_are_said() -> None:
+    text = (DOCS / "what_to_do.md").read_text()
+    sources = [file.read_text() for room in ("pcii", "simgen") for file in (ROOT / room).rglob("*.py")]
+    said = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))  # sentences that go on in the next line
+    sentences = re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
+    assert len(sentences) > 12
+    assert [sentence for sentence in sentences if sentence not in said] == []
