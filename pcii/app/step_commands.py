@@ -18,8 +18,10 @@ from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
 from pcii.app.report_tables import result_tables
 from pcii.base.command_line import say, say_next, say_next_page
+from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
+from pcii.depth.depth_planes import modes_mm
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.exposure import encoded
 from pcii.figures.panels import figure_bytes, new_figure
@@ -33,6 +35,7 @@ from pcii.store.folders import read_results
 from pcii.store.software import differences, own_software
 from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
 from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_limit import Light
 
 DEPTH_IN = 9.0
@@ -68,7 +71,10 @@ def run(
         A method of depth, as in `pcii depth`.
     """
     data = dataset_at(dataset, budget)
-    planes = planes_of(data, z_mm)
+    if z_range_mm is None or has_depths(data, z_mm):
+        planes = planes_of(data, z_mm)
+    else:
+        planes = _planes_of_surfaces(data, z_range_mm, depth_method)
     z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
@@ -80,6 +86,18 @@ def run(
     _warn_of_few_depths(outcome.depth, data, z_range_mm)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
+
+
+def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: str) -> FocalPlanes:
+    """Planes where the depth map has most surfaces, which are said; `InputError` if it has none."""
+    depth_map = estimate_depth(data.counts_or_views, z_range_mm, method=method)
+    depths_mm = modes_mm(depth_map, data.grid)
+    if not depths_mm:
+        raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
+    sure = float(depth_map.confidence[np.isfinite(depth_map.z_mm)].mean())
+    names = ", ".join(f"{z:.4g}" for z in depths_mm)
+    say(f"looking at {names} mm, where the depth map has most surfaces; its depths are right with {sure:.0%}")
+    return FocalPlanes.at_depths(data.grid, depths_mm)
 
 
 def reconstruct(

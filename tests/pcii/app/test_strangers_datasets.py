@@ -1,6 +1,7 @@
 """`pcii run` on datasets that no recipe made: with and without truth, counts only, radiance only."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -81,8 +82,19 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert "or a range with --z-range-mm" in capsys.readouterr().err
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 450, 700) == 0
     assert "depth.png: 450 mm is yellow, 700 mm violet" in capsys.readouterr().out
+    fast = ["--method", "brightness", "--depth-method", "variance-sweep"]
+    found = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, *fast]
+    assert run(*found) == 2
+    assert "no depth is found in the range; name depths with --z-mm" in capsys.readouterr().err
+    texture = np.random.default_rng(2).gamma(0.5, 40, (40, 48))  # 2 px from view to view are 500 mm
+    wall = [[np.roll(texture, (-2 * k, -2 * l), (0, 1)) for l in range(2)] for k in range(2)]
+    photons = np.random.default_rng(3).poisson(wall)
+    save_dataset(tmp_path / "wall", PhotonCounts.from_dense(photons, GRID))
+    assert run("run", tmp_path / "wall", "-o", tmp_path / "seen", *found[4:-2]) == 0
+    (depths,) = re.findall(r"looking at ([\d., ]+) mm, where the depth map has most", capsys.readouterr().out)
+    assert min(abs(float(text) - 500) for text in depths.split(",")) < 30
     command = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, "--z-mm", 600]
-    assert run(*command, "--method", "brightness", "--depth-method", "variance-sweep") == 0
+    assert run(*command, *fast) == 0
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 700, 400) == 2
     assert "near must be less than far" in capsys.readouterr().err
 

@@ -6,6 +6,7 @@ import pytest
 from twins import unit_grid
 
 import pcii
+from pcii.depth.depth_planes import modes_mm
 from pcii.depth.methods import GROUP, depth_methods, estimate_depth
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
@@ -184,3 +185,19 @@ def test_too_many_photons_for_the_likelihood_sweep_are_refused() -> None:
     bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 2**20 + 1), grid)
     with pytest.raises(pcii.InputError, match=r"more than 2\^40 photons"):
         estimate_depth(bright, (0.5, 1.0), method="sweep-17")
+
+
+def test_planes_are_where_a_depth_map_has_most_surfaces() -> None:
+    """Two walls and a card, by hand: shares of the confidence, not of the pixels, decide."""
+    grid = unit_grid(4, 4, 20, 40)  # total disparities are 3 / z px
+    total_px = np.full((20, 40), np.nan)
+    confidence = np.ones((20, 40))
+    total_px[:, :20], total_px[:, 20:30] = 30.0, 33.5
+    total_px[:, 30:33], total_px[:, 33:36] = 50.0, 52.0  # of one bulging thing
+    total_px[:, 36:], confidence[:, 36:] = 70.0, 0.1  # as large, and unsure
+    depth = pcii.DepthMap(3 / total_px, confidence)
+    # What is within 4 px of the largest window belongs to it: its edge, not a surface of its own.
+    assert modes_mm(depth, grid) == pytest.approx([3 / 51, 3 / 31.1667], rel=1e-4)
+    apart = pcii.DepthMap(3 / np.where(total_px == 33.5, 35.5, total_px), confidence)
+    assert modes_mm(apart, grid) == pytest.approx([3 / 51, 3 / 35.5, 3 / 30], rel=1e-4)
+    assert modes_mm(pcii.DepthMap(np.full((20, 40), np.nan), 0 * confidence), grid) == ()
