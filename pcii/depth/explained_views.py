@@ -1,4 +1,4 @@
-"""What the photons of all cameras say of masks of sheets, by an objective that does not fall, and of depths.
+"""What the photons of all cameras say of masks of sheets, by an objective that does not fall.
 
 Each camera sees the sheets from near to far: where camera k looks at x, a photon has the density
 
@@ -10,8 +10,8 @@ reaches the blocks, so that all follows from the masks. The objective is the log
     F(m) = sum_photons log q - integral q,
 
 in which each photon is predicted by the others alone: what explains its own noise gains nothing. Masks start
-as the network has them, and move towards what it and the photons say together, as far as F rises. Depths
-follow by one step from those of the network (docs/theory.md, "What hides what").
+as the network has them, and move towards what it and the photons say together, as far as F rises
+(docs/theory.md, "What hides what").
 """
 
 from typing import NamedTuple
@@ -24,7 +24,6 @@ from pcii.depth.sheet_kernels import (
     expect_photons,
     explain_photons,
     meet_sheets,
-    move_photons,
     reach_sheets,
 )
 from pcii.depth.sheet_textures import smooth_texture, textures
@@ -41,34 +40,28 @@ TINY = np.finfo(np.float32).tiny
 
 
 class Rays(NamedTuple):
-    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); `colour` (N,) int8; and by
-    how many blocks down and to the right they move with each px of total disparity, `moves`."""
+    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); and `colour` (N,) int8."""
 
     blocks: np.ndarray
     order: np.ndarray
     colour: np.ndarray
-    moves: tuple[np.ndarray, np.ndarray]
 
 
 class State(NamedTuple):
     """`masks` (L, h, w), their `objective` in nats, and its `slope` (L, h, w): by how much more a block
-    explains if the sheet is there than if it is not, as all else stays. Then what follows from the masks:
-    `textures` (Q, L + 1, h w), and how far photons and rays of the film `reach` (N, L + 1)."""
+    explains if the sheet is there than if it is not, as all else stays."""
 
     masks: np.ndarray
     objective: float
     slope: np.ndarray
-    textures: np.ndarray
-    reach: tuple[np.ndarray, np.ndarray]
 
 
 class Explanation(NamedTuple):
     """Probabilities (L, h, w) that each sheet is what is seen, `before` by the network alone and `after` by
-    the photons, and by how many px of total disparity it is nearer, `nearer_px` (L, h, w) float32."""
+    the photons."""
 
     before: np.ndarray
     after: np.ndarray
-    nearer_px: np.ndarray
 
 
 class ExplainedViews:
@@ -100,40 +93,6 @@ class ExplainedViews:
             self.state = state
         return is_better
 
-    def nearer_px(self) -> np.ndarray:
-        """By how many px of total disparity (L, h, w) sheets are nearer than the network says.
-
-        One step of Newton's method from its depths, as masks and textures stay (the one-step estimator of Le
-        Cam 1956): the slope of F over its curvature, the sum of the squared slopes of photons, in wide
-        windows of blocks where a sheet is seen. The network's depth counts by its error. Only differences
-        between cameras that see the same block count, so that errors of its brightness do not (Neyman 1959).
-        """
-        photons, (masks, _, _, textures, reach) = self.photons, self.state
-        L, w = len(masks), masks.shape[-1]
-        gain, of_sheets = np.zeros((len(photons.blocks), L), np.float32), (masks.reshape(L, -1), textures)
-        moves = photons.moves, self._mean_moves()
-        move_photons(*photons[:3], reach[0], moves, of_sheets, w, gain)
-        is_inner = self._inner_blocks()
-        slope, curvature = (is_inner * self._of_blocks(photons, values) for values in (gain, gain**2))
-
-        def of_sheet(sheet: int) -> np.ndarray:
-            return self._newton_step(slope[sheet], curvature[sheet])
-
-        return np.stack(each_in_threads(of_sheet, range(L)))
-
-    def _mean_moves(self) -> tuple[np.ndarray, np.ndarray]:
-        """The mean moves (L + 1, h w), down and right, of rays that reach the sheets in the blocks around."""
-        film, reach = self.film, self.state.reach[1]
-        weights = gaussian_weights(self.model.window_blocks, 3)
-
-        def around(values: np.ndarray) -> np.ndarray:
-            means = [gaussian_mean(part, weights) for part in self._of_blocks(film, values)]
-            return np.reshape(means, (len(means), -1))
-
-        views = around(reach) + TINY
-        down, right = (around(reach * move[:, None]) / views for move in film.moves)
-        return down, right
-
     def _of_blocks(self, rays: Rays, values: np.ndarray) -> np.ndarray:
         """The sums (S, h, w) of the values (N, S) of rays in the blocks that they meet."""
         return self._of_colours(rays._replace(colour=np.zeros_like(rays.colour)), values, 1)[:, 0]
@@ -144,26 +103,6 @@ class ExplainedViews:
         sums = np.zeros((values.shape[1], colours, h * w), np.float32)
         add_up(sums, rays.blocks, rays.colour, values)
         return sums.reshape(*sums.shape[:2], h, w)
-
-    def _inner_blocks(self) -> np.ndarray:
-        """Where network and photons agree on the sheet that is seen (L, h, w) bool, so far from outlines that
-        these say nothing of depth.
-
-        There masks are less exact and, of round things, depths: the rim is too near. Plain dark light around
-        a thing may be of its sheet for all that photons say; then its outline is within the sheet.
-        """
-        from scipy.ndimage import maximum_filter, minimum_filter
-
-        masks, side = self.state.masks, 2 * round(2 * self.model.window_blocks) + 1
-        of_network, sheet = (_find_visible_sheet(self.sheets.visible(each)) for each in (self.prior, masks))
-        is_inner = (maximum_filter(sheet, side) == minimum_filter(sheet, side)) & (sheet == of_network)
-        return is_inner & (sheet == np.arange(len(masks))[:, None, None])
-
-    def _newton_step(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-        model = self.model
-        blocks = np.float32(2 * np.pi * 4**model.wide_octave)
-        slope, curvature = (blocks * _wide_mean(part, model.wide_octave) for part in (slope, curvature))
-        return np.float32(model.depth_step) * slope / (curvature + np.float32(model.depth_error_px**-2))
 
     def _best_masks(self) -> np.ndarray:
         """The most probable masks (L, h, w) if all else stays as it is.
@@ -205,10 +144,10 @@ class ExplainedViews:
         T, photon_share = self._textures(masks, reached, exposure)
         of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons[:3], photon_reach, of_sheets, gain))
+        likelihood = sum(explain_photons(*photons, photon_reach, of_sheets, gain))
         expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, of_sheets, loss))
         slope = self._of_blocks(photons, gain) - self._of_blocks(film, loss)
-        return State(masks, likelihood - expected, slope, of_sheets[1], (photon_reach, film_reach))
+        return State(masks, likelihood - expected, slope)
 
     def _textures(
         self, masks: np.ndarray, reached: np.ndarray, exposure: np.ndarray
@@ -231,17 +170,12 @@ class ExplainedViews:
 
 
 def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> Explanation:
-    """What the photons say of sheets: first of the masks, then of the depths."""
+    """What the photons say of sheets, after as many sweeps as raise the objective."""
     views = ExplainedViews(counts, sheets, block_px, model)
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks), views.nearer_px())
-
-
-def _find_visible_sheet(visible: np.ndarray) -> np.ndarray:
-    """Number (h, w) of the sheet that is more probably what is seen than not, -1 where none is."""
-    return np.where(visible.max(axis=0) > 0.5, visible.argmax(axis=0), -1)
+    return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
 
 
 def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
@@ -260,7 +194,7 @@ def _met(sheets: Sheets, rays: tuple[np.ndarray, ...], colour: np.ndarray) -> Ra
     shape = rays[0].size, len(sheets.total_px) + 1
     blocks, order = np.empty(shape, np.int32), np.empty(shape, np.int8)
     meet_sheets(blocks, order, sheets.total_px, rays)
-    return Rays(blocks, order, colour, (rays[2], rays[3]))
+    return Rays(blocks, order, colour)
 
 
 def _photon_rays(counts: PhotonCounts, block_px: int, most: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:

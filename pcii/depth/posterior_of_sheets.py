@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pcii.depth.explained_views import Explanation
-from pcii.depth.sheet_kernels import move_planes
+from pcii.depth.sheet_kernels import grow_planes
 from pcii.depth.sheets import Sheets
 from pcii.types.estimates import DepthPosterior
 
@@ -13,7 +13,7 @@ from pcii.types.estimates import DepthPosterior
 def posterior_after(
     posterior: DepthPosterior, sheets: Sheets, explained: Explanation, least: float
 ) -> DepthPosterior:
-    """The posterior whose planes near a sheet move with it, and grow by the root of how much more it is seen.
+    """The posterior whose planes near a sheet grow by the root of how much more it is seen.
 
     So do no surface and planes far from all sheets with the light without depth. Where the photons
     around do not tell the depth the network's stays. The probability of being in focus at a requested plane
@@ -23,13 +23,10 @@ def posterior_after(
     before, after = (_with_nothing(visible) for visible in (explained.before, explained.after))
     growth = _of_depths(sheets, after, least) / _of_depths(sheets, before, least)
     in_focus = _in_focus_after(posterior.in_focus, sheets, before, growth)
-    probability, no_surface = np.zeros_like(posterior.probability), np.empty_like(posterior.no_surface)
+    probability, no_surface = posterior.probability.copy(), posterior.no_surface.copy()
     planes_px = posterior.planes.total_disparity_px
-    step_px = np.ptp(planes_px) / max(len(planes_px) - 1, 1) or 1.0
     # The network's planes know the same photons already, so that what sheets say of them counts half.
-    change = explained.nearer_px / np.float32(step_px), np.sqrt(growth)
-    old = posterior.probability, posterior.no_surface
-    move_planes(probability, no_surface, old, planes_px, sheets.total_px, sheets.same_px, change)
+    grow_planes(probability, no_surface, planes_px, sheets.total_px, sheets.same_px, np.sqrt(growth))
     is_supported = posterior.is_supported
     probability = np.where(is_supported, probability, posterior.probability)
     no_surface = np.where(is_supported, no_surface, posterior.no_surface)

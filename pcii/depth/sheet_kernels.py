@@ -153,51 +153,6 @@ def expect_photons(
     return total
 
 
-@helper
-def _slope(texture: np.ndarray, block: int, w: int, a: float, b: float) -> float:
-    """By how much a texture (n,) grows at a block as the ray moves by (a, b) blocks; w blocks are a row."""
-    row, column = block - block % w, block % w
-    above, below = max(block - w, column), min(block + w, texture.size - w + column)
-    left, right = row + max(column - 1, 0), row + min(column + 1, w - 1)
-    return (a * (texture[below] - texture[above]) + b * (texture[right] - texture[left])) / 2
-
-
-@shared(lambda blocks, *_: len(blocks))
-def move_photons(
-    first: int,
-    last: int,
-    blocks: np.ndarray,
-    order: np.ndarray,
-    colour: np.ndarray,
-    reach: np.ndarray,
-    moves: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
-    state: tuple[np.ndarray, ...],
-    w: int,
-    gain: np.ndarray,
-) -> None:
-    """Fill `gain` (N, L), by how much the log q of a photon grows with each px that a sheet is nearer.
-
-    `moves` are the (a, b) of the rays and those of the mean of all rays that meet a block (L, n), from which
-    they are counted; `state` is m and T.
-    """
-    m, T = state
-    (a, b), (mean_a, mean_b) = moves
-    L = len(m)
-    for ray in range(first, last):
-        texture, place = T[colour[ray]], 0
-        q = reach[ray, L] * texture[L, blocks[ray, L]]
-        while order[ray, place] < L:
-            sheet = order[ray, place]
-            block = blocks[ray, sheet]
-            visible = reach[ray, sheet] * m[sheet, block]
-            q += visible * texture[sheet, block]
-            down, right = a[ray] - mean_a[sheet, block], b[ray] - mean_b[sheet, block]
-            gain[ray, sheet] = visible * _slope(texture[sheet], block, w, down, right)
-            place += 1
-        for met in range(place):
-            gain[ray, order[ray, met]] /= q
-
-
 @shared(lambda sums, *_: len(sums))
 def add_up(
     first: int, last: int, sums: np.ndarray, blocks: np.ndarray, colour: np.ndarray, values: np.ndarray
@@ -285,42 +240,29 @@ def share_planes(
 
 
 @shared(lambda probability, *_: probability.shape[1])
-def move_planes(
+def grow_planes(
     first: int,
     last: int,
     probability: np.ndarray,
     no_surface: np.ndarray,
-    before: tuple[np.ndarray, np.ndarray],
     planes_px: np.ndarray,
     total_px: np.ndarray,
     near_px: float,
-    change: tuple[np.ndarray, np.ndarray],
+    growth: np.ndarray,
 ) -> None:
-    """Add to the `probability` (Z, h, w) of planes, and fill `no_surface` (h, w), from those `before`.
-
-    `change` is by how many planes (L, h, w) sheets move, and how many times more (L + 1, h, w) they are seen,
-    and the light without depth is: planes near a sheet move with it.
-    """
-    old, nothing = before
-    moves, growth = change
-    Z, _, w = old.shape
+    """Multiply the `probability` (Z, h, w) of planes near a sheet, and that of `no_surface` (h, w), by how
+    many times more (L + 1, h, w) the sheet is seen, and the light without depth is; normalised."""
+    Z, _, w = probability.shape
     L = len(total_px)
     for i in range(first, last):
         for j in range(w):
-            no_surface[i, j] = nothing[i, j] * growth[L, i, j]
+            no_surface[i, j] *= growth[L, i, j]
         total = no_surface[i].copy()
         for z in range(Z):
             for j in range(w):
                 nearest = _nearest_sheet(total_px, i, j, planes_px[z], near_px)
-                place = np.float32(z)
-                if nearest < L:
-                    place = min(max(place + moves[nearest, i, j], np.float32(0)), np.float32(Z - 1))
-                plane = int(place)
-                mass = old[z, i, j] * growth[nearest, i, j]
-                beyond = mass * (place - plane)
-                probability[plane, i, j] += mass - beyond
-                probability[min(plane + 1, Z - 1), i, j] += beyond
-                total[j] += mass
+                probability[z, i, j] *= growth[nearest, i, j]
+                total[j] += probability[z, i, j]
         for j in range(w):
             no_surface[i, j] /= total[j]
             probability[:, i, j] /= total[j]

@@ -51,15 +51,8 @@ class SheetModel:
     sweeps: int = 6
     """At most, as long as the objective rises; with none the network decides alone."""
     wide_octave: int = 4
-    """In windows of 2 to this power blocks sheets move in depth, and the share of noise in the evidence is
-    computed. If it is larger, bent things move as one; if smaller, noise decides, and plain walls stay
-    where they are."""
-    depth_error_px: float = 1.0
-    """Standard deviation of the error of the network's depth in such a window. If it is larger, the photons
-    decide in less light, with more noise; if smaller, the network does."""
-    depth_step: float = 0.5
-    """Share of the way to the best depths. Textures are blurred where depths are wrong, so that their slopes
-    are too small and all of the way is too far; if it is smaller, depths stay where they are."""
+    """In windows of 2 to this power blocks the share of noise in the evidence is computed. If it is larger,
+    small things are judged by what is around; if smaller, noise decides."""
 
 
 class Sheets(NamedTuple):
