@@ -43,6 +43,7 @@ NO_NUMBERS = {
     "verify": "reads a folder",
     "InputError": "the refusal itself",
     "ViewOrder": "four switches",
+    "FrameFormat": "checked by `import_counts`",
     "depth_methods": "names",
     "removal_methods": "names",
     "open_collection": "opens a folder",

@@ -35,6 +35,8 @@ PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
+MANY_VIEWS = 100
+"""More than so many, and than each has numbers, are pixels: the axes are in another order."""
 AXES = "KLNTHWC"
 """The order in which axes are understood: cameras or views, frames, pixels, colours."""
 FRAMES_AT_ONCE = 255
@@ -235,7 +237,7 @@ def _by_camera(
         axes = "KL" if grid is None else "N"
         count = np.prod(numbers.shape[: len(axes)], dtype=np.int64)
         is_known = numbers.ndim - len(axes) < 2 or numbers.shape[-1] in (3, 4)  # colours have a sentence
-        if not is_known and count > np.prod(numbers.shape[len(axes) :], dtype=np.int64):
+        if not is_known and count > max(MANY_VIEWS, np.prod(numbers.shape[len(axes) :], dtype=np.int64)):
             raise InputError(
                 f"{name}: {numbers.shape} would be more views than each has numbers; name the order of its "
                 "axes with --axes, such as HWKL"
