@@ -32,7 +32,8 @@ from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
 
 MOVING_SHARE = 0.25
-"""Of the longer side: a total disparity with which nothing stands still in the views."""
+"""A point whose total disparity is this share of a view's longer side is elsewhere in each view, so that what
+is at the same pixel in most of them is a fault of the sensor, or at infinity."""
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 

@@ -64,10 +64,10 @@ def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
         mass = np.concatenate([[0.0], np.cumsum(weight)])
         ends = np.searchsorted(total_px, total_px + 2 * MODE_PX, side="right")
         first = int(np.argmax(mass[ends] - mass[:-1]))
-        own = slice(first, int(ends[first]))
-        if (share := weight[own].sum()) < least:
+        window = slice(first, int(ends[first]))
+        if (share := weight[window].sum()) < least:
             break
-        modes.append(float(weight[own] @ total_px[own] / share))
+        modes.append(float(weight[window] @ total_px[window] / share))
         weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
     return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())
 

@@ -64,8 +64,8 @@ def _accuracies(table: "DataFrame", measure: str) -> "DataFrame":
     cells = table[table["measure"] == measure].set_index(["method", "light"])[["mean", "low", "high"]]
     cells = cells.assign(**{end: cells[end].fillna(cells["mean"]) for end in ("low", "high")})
     for name in PLACES:
-        own = table[table["measure"] == name].set_index(["method", "light"])["mean"]
-        cells[name] = own.reindex(cells.index)
+        places = table[table["measure"] == name].set_index(["method", "light"])["mean"]
+        cells[name] = places.reindex(cells.index)
     return cells.reset_index()
 
 

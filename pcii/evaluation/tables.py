@@ -124,9 +124,11 @@ def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
     """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
     means = over_scenes(of_cells)
     for measure, title in TITLES.items():
-        own = means[means["measure"] == measure]
-        if len(own):
-            table = own.pivot(index="method", columns="light", values="mean").sort_index(axis="columns")
+        of_measure = means[means["measure"] == measure]
+        if len(of_measure):
+            table = of_measure.pivot(index="method", columns="light", values="mean").sort_index(
+                axis="columns"
+            )
             table = table.rename(columns={light: light_name(light) for light in table.columns})
             table.index.name = table.columns.name = None
             yield title, table.to_string(float_format="{:.3f}".format, na_rep="–")

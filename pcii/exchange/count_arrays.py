@@ -36,7 +36,8 @@ PIECE_BYTES = 1 << 23
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
 MANY_VIEWS = 100
-"""More than so many, and than each has numbers, are pixels: the axes are in another order."""
+"""An array of more views than this, and of more than each view has pixels, has its axes in another order:
+what was taken for cameras are pixels."""
 AXES = "KLNTHWC"
 """The order in which axes are understood: cameras or views, frames, pixels, colours."""
 FRAMES_AT_ONCE = 255

@@ -22,7 +22,7 @@ MOST_BITS = 16
 EXACT = ("PNG", "TIFF", "EXR")
 """Kinds of pictures that keep photon counts."""
 SURE_NATS = 20.0
-"""What happens by chance once in e^20 imports is said."""
+"""How much evidence a sentence on the numbers needs: by chance alone one import in e^20 would get it."""
 MIN_COLUMN_MEAN = 10
 """Mean number of counts of a column from which a column without any is warned of; by chance it is one in
 e^10. If it is smaller, dim captures are warned of without a reason."""

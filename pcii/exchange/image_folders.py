@@ -274,10 +274,7 @@ def import_lens_array(
     is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
     `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
     """
-    picture = picture_of(Path(path), VIEWS)
-    if picture.pages > 1:
-        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    _tell_unused([(Path(path), picture.unused)], tell)
+    picture = _single_picture(Path(path), tell)
     height, width, channels = picture.shape
     optics = replace(optics, pixel_mm=optics.pixel_of(width), sensor_mm=None)
     across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
@@ -296,6 +293,15 @@ def import_lens_array(
     return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
 
 
+def _single_picture(path: Path, tell: Tell) -> Picture:
+    """The picture of a file that holds one; `tell` takes what else is in it."""
+    picture = picture_of(path, VIEWS)
+    if picture.pages > 1:
+        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
+    _tell_unused([(path, picture.unused)], tell)
+    return picture
+
+
 def import_interlaced(
     path: str | Path,
     interlaced: tuple[int, int],
@@ -312,10 +318,7 @@ def import_interlaced(
     those of views; `sensor_mm` is the width of the whole picture. Raises `InputError` for a picture of no
     whole number of blocks, and for a mosaic.
     """
-    picture = picture_of(Path(path), VIEWS)
-    if picture.pages > 1:
-        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    _tell_unused([(Path(path), picture.unused)], tell)
+    picture = _single_picture(Path(path), tell)
     (height, width, channels), (rows, cols) = picture.shape, interlaced
     if min(rows, cols) < 1 or height % rows or width % cols:
         raise InputError(
