@@ -19,9 +19,9 @@ from tiny import TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.exchange.dataset_card import Terms, write_card
 from pcii.figures.pictures import write_png
 from pcii.store.dataset import copy_sample
+from pcii.store.dataset_card import Terms, write_card
 from simgen.spec.recipe import Recipe, override
 
 DOCS = ROOT / "docs"

@@ -12,6 +12,7 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.exchange.camera_fit import CameraFit, check_grid
+from pcii.exchange.depth_files import NO_DEPTH, DepthFile
 from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
 from pcii.exchange.import_requests import (
     Cameras,
@@ -45,6 +46,7 @@ def import_dataset(
     pattern: str | None = None,
     grid: WholePair = None,
     axes: str | None = None,
+    key: str | None = None,
     counts: bool = False,
     frames: WholePair = None,
     stored: Annotated[FrameFormat, FLAT] = AS_COUNTED,
@@ -53,6 +55,7 @@ def import_dataset(
     lenses: Annotated[Lenses, FLAT] = LENSES,
     light: Annotated[PictureLight, FLAT] = LIGHT,
     cfa: str | None = None,
+    true_depth: Annotated[DepthFile, FLAT] = NO_DEPTH,
     photons: float | None = None,
     seed: int | None = None,
     z_mm: Depths = (),
@@ -76,7 +79,7 @@ def import_dataset(
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
         benchmark, pictures or photon cubes with a transforms.json, a picture of a lens array, an array in a
-        .npy file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
+        .npy, .npz, .mat or HDF5 file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
     out
         Folder for the dataset: new or empty.
     pattern
@@ -89,6 +92,8 @@ def import_dataset(
         Order of the axes of an array: K and L, rows and columns of cameras, or N, all views; T, frames; H and
         W, rows and columns of pixels; C, colours. Such as HWKL. Default: KLHW, KLHWC, KLTHW, or with --grid N
         in place of KL.
+    key
+        Name of the array in a .npz, .mat or HDF5 file. Default: the only one of at least three axes.
     counts
         The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
     frames
@@ -108,7 +113,7 @@ def import_dataset(
     """
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
-    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "axes": axes, "counts": counts}
+    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "axes": axes, "key": key, "counts": counts}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light, stored):
         options |= vars(group)
@@ -125,11 +130,12 @@ def import_dataset(
             images.append(limit_photons(imported.images, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
         z_range = z_range_mm or imported.z_range_mm
+        truth = true_depth.truth_for(imported.images.grid, notes.append) or imported.truth
         fit = check_grid(_without_hot_pixels(imported.images, notes.append), z_range, order=order)
         dataset = save_dataset(
             out,
             images,
-            imported.truth,
+            truth,
             z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,

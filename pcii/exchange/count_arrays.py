@@ -12,13 +12,13 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.exchange.array_files import open_array
 from pcii.exchange.frame_formats import (
     AS_COUNTED,
     EXACT,
     SURE_NATS,
     FrameFormat,
     expected_above_one,
-    map_array,
     warn_of_bit_order,
     warn_of_dark_columns,
     warn_of_numbers,
@@ -53,17 +53,18 @@ def import_arrays(
     encoding: Encoding | None = None,
     cfa: str | None = None,
     axes: str | None = None,
+    key: str | None = None,
 ) -> Views:
-    """Radiance of an array (K, L, H, W) or (K, L, H, W, C), C = 1 or 3, or of a .npy file of one.
+    """Radiance of an array (K, L, H, W) or (K, L, H, W, C), C = 1 or 3, or of a file of one.
 
     With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C); or its `axes` are named, such as "HWKL", N
-    being views. Floats are linear, unless `encoding` says
-    otherwise; whole numbers need it: they may be sRGB of pictures or linear values of a sensor, which the
-    file does not tell. `cfa` is a Bayer pattern, of which arrays of one channel are mosaics. Raises
-    `InputError` for what does not fit.
+    being views. Files are .npy, .npz, .mat and HDF5, of which `key` names one of several arrays. Floats are
+    linear, unless `encoding` says otherwise; whole numbers need it: they may be sRGB of pictures or linear
+    values of a sensor, which the file does not tell. `cfa` is a Bayer pattern, of which arrays of one channel
+    are mosaics. Raises `InputError` for what does not fit.
     """
     is_array = isinstance(source, np.ndarray)
-    numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
+    numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
     views = order.arrange(_by_camera(numbers, name, grid, order, axes, "H, W[, C]"))
     if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
         raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
@@ -96,6 +97,7 @@ def import_counts(
     order: ViewOrder = AS_STORED,
     cfa: str | None = None,
     axes: str | None = None,
+    key: str | None = None,
     frames: tuple[int, int] | None = None,
     stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
@@ -104,10 +106,11 @@ def import_counts(
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
     An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, a .npy file
-    (N, H, W) or (H, W), or has no header (see `FrameFormat`); with {frame} in the pattern it is one frame.
+    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, an array (N, H, W) or
+    (H, W) in a .npy, .npz, .mat or HDF5 file, in which `key` names it, or has no header (see `FrameFormat`);
+    with {frame} in the pattern it is one frame.
     For `pattern` and `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array,
-    or a .npy file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
+    or a file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
     (K L, H, W) or (K L, N, H, W); or its `axes` are named, such as "HWKL" or "NTHW", N being views and T
     frames. Of frames in three channels each pixel keeps the colour of its filter in
     `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
@@ -115,7 +118,7 @@ def import_counts(
     left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
     """
     stored.check()
-    stacks = _stacks_of(source, pattern, grid, order, axes, stored, tell)
+    stacks = _stacks_of(source, pattern, grid, order, axes, key, stored, tell)
     name, first = stacks[0, 0].name, stacks[0, 0].load()
     if first.ndim not in (3, 4) or 0 in first.shape or (stored.bitpack and first.dtype != np.uint8):
         expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if stored.bitpack else "(T, H, W)"
@@ -264,13 +267,13 @@ def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:
     return numbers.transpose([axes.index(axis) for axis in AXES if axis in names])
 
 
-def _frames_of(stored: FrameFormat, path: Path) -> np.ndarray:
+def _frames_of(stored: FrameFormat, key: str | None, path: Path) -> np.ndarray:
     """The frames (T, H, row[, 3]) of a view: pages of a picture, or a file that is mapped into memory."""
     if stored.frame_size is not None:
         return stored.frames_in(path)
     if is_picture(path):
         return _of_one_channel(np.stack([*decode(picture_of(path, EXACT))]))
-    numbers = map_array(path)
+    numbers = open_array(path, key)
     return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
 
 
@@ -289,8 +292,8 @@ class FrameStack(NamedTuple):
 class FrameFiles:
     """Files (T,) of a frame each as an array (T, H, row[, 3]), of which slices of frames are read."""
 
-    def __init__(self, stored: FrameFormat, paths: Sequence[Path]) -> None:
-        self.stored, self.paths = stored, paths
+    def __init__(self, stored: FrameFormat, key: str | None, paths: Sequence[Path]) -> None:
+        self.stored, self.key, self.paths = stored, key, paths
         first = self[:1]
         self.shape, self.ndim, self.dtype = (len(paths), *first.shape[1:]), first.ndim, first.dtype
 
@@ -298,7 +301,7 @@ class FrameFiles:
         return len(self.paths)
 
     def __getitem__(self, some: slice) -> np.ndarray:
-        frames = [_frames_of(self.stored, path) for path in self.paths[some]]
+        frames = [_frames_of(self.stored, self.key, path) for path in self.paths[some]]
         for path, frame in zip(self.paths[some], frames, strict=True):
             if frame.shape != (1, *frames[0].shape[1:]) or frame.dtype != frames[0].dtype:
                 raise InputError(f"{path}: expected one frame as in {self.paths[0].name}")
@@ -311,6 +314,7 @@ def _stacks_of(
     grid: tuple[int, int] | None,
     order: ViewOrder,
     axes: str | None,
+    key: str | None,
     stored: FrameFormat,
     tell: Tell,
 ) -> np.ndarray:
@@ -322,9 +326,9 @@ def _stacks_of(
         stacks = np.empty(paths.shape, object)
         for camera, path in np.ndenumerate(paths):
             if isinstance(path, tuple):
-                stacks[camera] = FrameStack(str(path[0]), partial(FrameFiles, stored, path))
+                stacks[camera] = FrameStack(str(path[0]), partial(FrameFiles, stored, key, path))
             else:
-                stacks[camera] = FrameStack(str(path), partial(_frames_of, stored, path))
+                stacks[camera] = FrameStack(str(path), partial(_frames_of, stored, key, path))
         return stacks
     if stored.frame_size is not None:
         raise InputError(f"{source}: --frame-size is for a folder of files without a header and --pattern")
@@ -332,7 +336,7 @@ def _stacks_of(
         _, pages = pages_of(Path(source), grid, order, tell)
         source, grid, order, axes = _of_one_channel(pages), None, AS_STORED, None
     is_array = isinstance(source, np.ndarray)
-    numbers, name = (source, "array") if is_array else (map_array(Path(source)), str(source))
+    numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
 
     def arrange(numbers: np.ndarray) -> np.ndarray:
         views = order.arrange(_by_camera(numbers, name, grid, order, axes, "[T,] H, W"))
@@ -340,7 +344,9 @@ def _stacks_of(
         return views if has_frames else views[:, :, None]
 
     def load(camera: tuple[int, int]) -> np.ndarray:
-        views = arrange(source if isinstance(source, np.ndarray) else map_array(Path(source)))
+        # A new map of each view, so that what was read of the others leaves memory.
+        is_mapped = not isinstance(source, np.ndarray) and isinstance(numbers, np.memmap)
+        views = arrange(open_array(Path(str(source)), key) if is_mapped else numbers)
         return _of_one_channel(views[camera])
 
     views = arrange(numbers)

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
+from pcii.exchange.array_files import open_array
 from pcii.exchange.pixel_files import decode, kind_of, picture_of
 from pcii.exchange.stated_cameras import Tell
 from pcii.types.arrays import whole_counts
@@ -140,7 +140,7 @@ class FrameFormat:
         if path.is_file() and kind_of(path) is not None:
             dead = np.any(next(decode(picture_of(path, EXACT))), axis=2)
         else:
-            dead = map_array(path).astype(np.bool_)
+            dead = open_array(path).astype(np.bool_)
         if dead.shape != shape_HW:
             raise InputError(f"--mask: {path} is {dead.shape}, and views are {shape_HW}, rows and columns")
         return dead
@@ -152,21 +152,6 @@ AS_COUNTED = FrameFormat()
 
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
-
-
-def map_array(path: Path) -> np.ndarray:
-    """The array of a .npy file, mapped into memory; `InputError` for any other file."""
-    try:
-        numbers = np.load(path, mmap_mode="r", allow_pickle=False)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
-    except MemoryError:
-        raise
-    except Exception:  # damaged headers raise various exceptions
-        raise InputError(f"{path}: not an array of numbers in a .npy file, as numpy.save writes it") from None
-    if not isinstance(numbers, np.ndarray):
-        raise InputError(f"{path}: is an archive; save a .npy file, which is read piece by piece")
-    return numbers
 
 
 def warn_of_numbers(name: str, stored: np.ndarray, tell: Tell) -> None:

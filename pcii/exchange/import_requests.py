@@ -31,6 +31,7 @@ from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
 
+COLMAP_FILES = ("cameras.bin", "cameras.txt", "sparse/0/cameras.bin", "sparse/0/cameras.txt")
 WholePair = tuple[int, int] | None
 Pair = tuple[float, float] | None
 
@@ -130,6 +131,12 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
             f"{source}: is a folder; --lens-array is for one picture, which holds all lens images"
         )
     if source.is_dir() and pattern is None:
+        if any((source / name).is_file() for name in COLMAP_FILES):
+            raise InputError(
+                f"{source}: is a model of COLMAP; if its cameras are of one plane grid, make it a "
+                "transforms.json with ns-process-data of nerfstudio, or name pictures and cameras with "
+                "--pattern and --pitch-mm"
+            )
         raise InputError(f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"')
     if not source.is_dir() and pattern is not None:
         raise InputError(f"{source}: --pattern is for a folder, and this is a file")

@@ -28,6 +28,11 @@ STARTS = {
     b"\x76\x2f\x31\x01": "EXR",
     b"Pf": "PFM",
 }
+OTHER_FILES = {
+    b"version https://git-lfs": "is a pointer of Git LFS and not the file itself; run git lfs pull",
+    b"SIMPLE  =": "is a FITS file, which is not read; save its array as .npy, TIFF or HDF5",
+}
+"""Starts of files that people give for pictures or arrays, and what is said of them."""
 PILLOW_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I;16", "F")
 TIFF_KINDS = ("MINISBLACK", "RGB", "CFA", "YCBCR")
 LIGHT_TYPES = ("uint8", "uint16", "float16", "float32", "float64")
@@ -94,12 +99,23 @@ def kind_of(path: Path) -> str | None:
     return next((kind for start, kind in STARTS.items() if head.startswith(start)), None)
 
 
+def name_other_file(path: Path) -> None:
+    """Raise `InputError` for a file whose start says that it is of a kind that is not read."""
+    if path.is_file():
+        with path.open("rb") as file:
+            head = file.read(max(map(len, OTHER_FILES)))
+        for start, sentence in OTHER_FILES.items():
+            if head.startswith(start):
+                raise InputError(f"{path}: {sentence}")
+
+
 def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
     """The picture in a file of one of these kinds; raises `InputError`, naming the file, if it has none.
 
     Pictures have one or three channels beside alpha.
     """
     readers = {"TIFF": _read_tiff, "EXR": _read_exr}
+    name_other_file(path)
     try:
         kind = kind_of(path)
         if kind is None or kind not in kinds:

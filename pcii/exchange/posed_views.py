@@ -11,9 +11,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.exchange.array_files import open_array
 from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.export_pictures import MM_PER_M
-from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat, map_array
+from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
 from pcii.exchange.image_folders import radiance_of_files, views_of
 from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.stated_cameras import Tell, warn
@@ -106,7 +107,7 @@ def import_posed_cubes(
     poses = find_grid(file)
     grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
     paths = np.array(file.file_paths, object)[poses.numbers]
-    first = map_array(paths[0, 0])
+    first = open_array(paths[0, 0])
     channels = first.shape[3] if first.ndim == 4 else 1
     if file.channels not in (None, channels):
         raise InputError(f"{file.path}: c: is {file.channels}, and {paths[0, 0]} has {channels} channels")

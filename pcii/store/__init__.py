@@ -2,6 +2,8 @@
 
 collection        Collections of datasets, opened one by one as they are used.
 dataset           Datasets: counts, truth and radiance of a dataset folder, each checked when it is read.
+dataset_card      README.md of a dataset or collection: what it is, how to open it, and under what terms it
+                  may be used.
 dataset_layout    The dataset folder on disk: its files, their arrays and its manifest.
 dataset_writer    Datasets written from images and truth in memory.
 folders           Folders that list their files: hashes, lists of files, and the document that makes a folder

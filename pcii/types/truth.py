@@ -77,8 +77,8 @@ class Truth(Drawn):
 
     @property
     def has_objects(self) -> bool:
-        """Whether a pixel shows an object."""
-        return bool((self.object_id > 0).any())
+        """Whether a pixel shows an object that is scored."""
+        return bool(((self.object_id > 0) & ~self.is_unscored).any())
 
     @property
     def is_unscored(self) -> np.ndarray:
@@ -87,11 +87,12 @@ class Truth(Drawn):
 
     @property
     def object_z_mm(self) -> np.ndarray:
-        """Depth of the objects that are scored (H, W) in mm, +inf elsewhere; of everything, if no object is
-        known."""
-        if not self.has_objects:
-            return self.z_mm
-        return np.where((self.object_id > 0) & ~self.is_unscored, self.z_mm, np.inf)
+        """Depth of the objects that are scored (H, W) in mm, +inf elsewhere; of all but those that are not
+        scored, if no other is known."""
+        is_meant = ~self.is_unscored
+        if self.has_objects:
+            is_meant &= self.object_id > 0
+        return np.where(is_meant, self.z_mm, np.inf)
 
 
 def _check_map(

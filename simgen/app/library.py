@@ -7,8 +7,8 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
-from pcii.exchange.dataset_card import write_card
 from pcii.store.collection import Collection, open_collection
+from pcii.store.dataset_card import write_card
 from pcii.store.manifests import DatasetManifest
 from simgen.app.pictures import Preview, check_picture_path, draw_preview
 from simgen.check.targets import load_target

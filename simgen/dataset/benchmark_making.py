@@ -21,7 +21,6 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
-from pcii.exchange.dataset_card import write_card, write_licence
 from pcii.store.collection import (
     BENCHMARK_FIELDS,
     CERTIFICATE,
@@ -31,6 +30,7 @@ from pcii.store.collection import (
     read_index,
 )
 from pcii.store.dataset import Dataset
+from pcii.store.dataset_card import write_card, write_licence
 from pcii.store.folders import hash_json
 from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate

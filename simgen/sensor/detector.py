@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.exchange.count_arrays import map_array
+from pcii.exchange.array_files import open_array
 from pcii.types.arrays import read_only
 from pcii.types.bayer import colour_index, mosaic
 from pcii.types.camera_grid import CameraGrid
@@ -71,7 +71,7 @@ def dark_map(sensor: Sensor, grid: CameraGrid, recipe_folder: Path) -> np.ndarra
     if sensor.hot_pixels is None:
         return None
     path = asset(recipe_folder, sensor.hot_pixels, "sensor.hot_pixels")
-    counts = map_array(path)
+    counts = open_array(path)
     if counts.shape not in (grid.shape_HW, grid.shape_KLHW):
         expected = f"(H, W) = {grid.shape_HW}, or (K, L, H, W) = {grid.shape_KLHW}"
         raise InputError(f"{path}: expected mean dark counts {expected}, got {counts.shape}")

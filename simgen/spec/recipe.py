@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
-from pcii.exchange.dataset_card import Terms
+from pcii.store.dataset_card import Terms
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_counts import MOST_BITS, MOST_FRAMES, Readout
 from simgen.base.file_lookup import find, find_all

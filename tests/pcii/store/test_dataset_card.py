@@ -9,8 +9,8 @@ from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, rewrite_manifest
 
 from pcii.base.errors import InputError
-from pcii.exchange.dataset_card import LICENCE, Terms, write_card, write_licence
 from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
+from pcii.store.dataset_card import LICENCE, Terms, write_card, write_licence
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
 from pcii.store.verification import verify

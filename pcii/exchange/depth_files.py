@@ -1,0 +1,124 @@
+"""A map of true depth that somebody measured or rendered, as the truth of imported views."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.exchange.array_files import open_array
+from pcii.exchange.pixel_files import decode, kind_of, picture_of
+from pcii.exchange.stated_cameras import Tell
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.truth import Truth
+
+DEPTH_PICTURES = ("PNG", "TIFF", "EXR", "PFM")
+"""Kinds of pictures that keep depth."""
+DEPTH_CHANNELS = ("Z", "V", "Y", "R")
+"""Ends of the names of channels that hold depth in EXR files of several, as renderers and Blender write them,
+the surest first."""
+NEAREST_MM, FARTHEST_MM = 0.1, 1e8
+"""Depths that can be: where a ray meets nothing renderers write 1e10."""
+UNKNOWN = 1
+"""Number of the object that stands for pixels of unknown depth, which count in no score."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthFile:
+    """A map of true depth of the virtual centre camera, which of an odd grid is the middle view."""
+
+    depth: Path | None = None
+    """True depth in the image of the virtual centre camera, which of an odd grid is the middle view: PNG,
+    TIFF, EXR, PFM or an array. 0, NaN and the largest whole number are unknown; infinity is nothing."""
+    depth_unit_mm: float = 1.0
+    """What a depth of 1 stands for in mm: 1000 of a file in metres."""
+    depth_along_ray: bool = False
+    """Depth is the distance from the camera, not along its axis."""
+
+    def truth_for(self, grid: CameraGrid, tell: Tell) -> Truth | None:
+        """The truth of views of a `grid`, None without a file. Pixels of unknown depth count in no score.
+
+        `tell` takes how many those are. Raises `InputError`, naming the file, for a map of another size, and
+        for depths that are not from 0.1 mm to 100 km.
+        """
+        if self.depth is None:
+            if self.depth_along_ray or self.depth_unit_mm != 1:
+                raise InputError("--depth-unit-mm, --depth-along-ray: are for a file of --depth")
+            return None
+        if not 0 < self.depth_unit_mm < np.inf:
+            raise InputError(f"--depth-unit-mm: expected a length above 0, got {self.depth_unit_mm:g}")
+        path = Path(self.depth)
+        numbers = _numbers_in(path)
+        if numbers.shape != grid.shape_HW:
+            raise InputError(
+                f"--depth: {path} is {numbers.shape}, and views are {grid.shape_HW}, rows x columns"
+            )
+        is_unknown = np.isnan(numbers) | (numbers == 0)
+        if numbers.dtype.kind in "iu":
+            is_unknown |= numbers == np.iinfo(numbers.dtype).max
+        z_mm = numbers.astype(np.float64) * self.depth_unit_mm
+        if self.depth_along_ray:
+            z_mm /= _ray_lengths(grid)
+        z_mm[is_unknown | (z_mm >= FARTHEST_MM)] = np.inf
+        if is_unknown.all() or not (z_mm >= NEAREST_MM).all():
+            least = f"{z_mm.min():.3g} mm" if not is_unknown.all() else "no known depth"
+            raise InputError(
+                f"--depth: {path} has {least}, where depths are from {NEAREST_MM:g} mm to 100 km; correct "
+                "--depth-unit-mm"
+            )
+        hit = z_mm[np.isfinite(z_mm)]
+        reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
+        tell(f"with the true depth of the virtual centre, {reach}, from {path.name}")
+        if is_unknown.any():
+            count = np.count_nonzero(is_unknown)
+            tell(f"{count} of {z_mm.size} pixels have no known depth there, and count in no score")
+        return Truth(
+            z_mm.astype(np.float32),
+            np.where(is_unknown, UNKNOWN, 0).astype(np.int16),
+            {UNKNOWN: "unknown depth"} if is_unknown.any() else {},
+            unscored=frozenset({UNKNOWN} if is_unknown.any() else ()),
+        )
+
+
+NO_DEPTH = DepthFile()
+"""Views without a map of true depth."""
+
+
+def _numbers_in(path: Path) -> np.ndarray:
+    """The numbers (H, W) of a file of depth."""
+    kind = kind_of(path) if path.is_file() else None
+    if kind is None:
+        return np.squeeze(open_array(path))
+    if kind == "EXR":
+        return _depth_channel(path)
+    picture = picture_of(path, DEPTH_PICTURES)
+    pixels = next(decode(picture))
+    if picture.pages > 1 or (pixels != pixels[..., :1]).any():
+        raise InputError(f"--depth: {path} has colours or several pages; expected one map of depth")
+    return pixels[..., 0]
+
+
+def _depth_channel(path: Path) -> np.ndarray:
+    """The channel of depth of an EXR file, which renderers name in several ways."""
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {
+                name: np.asarray(c.pixels) for part in file.parts for name, c in part.channels.items()
+            }
+    except Exception as fault:  # decoders raise various exceptions for damaged content
+        raise InputError(f"--depth: {path} is damaged ({fault})") from None
+    if len(channels) == 1:
+        return next(iter(channels.values()))
+    for end in DEPTH_CHANNELS:
+        for name, pixels in channels.items():
+            if name.split(".")[-1].upper() == end:
+                return pixels
+    raise InputError(f"--depth: {path} has the channels {', '.join(channels)[:60]}; expected Z, or one alone")
+
+
+def _ray_lengths(grid: CameraGrid) -> np.ndarray:
+    """Length (H, W) of the ray of each pixel of the virtual centre to the plane at depth 1."""
+    rows, cols = (np.arange(n) - (n - 1) / 2 for n in grid.shape_HW)
+    return np.hypot(np.hypot(rows[:, None], cols) * grid.pixel_mm / grid.focal_mm, 1.0)
