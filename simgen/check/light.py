@@ -15,6 +15,8 @@ MIN_PHOTONS = 100
 MIN_VOXEL_COUNTS = 0.1
 MAX_OTHER_SHARE = 0.5
 """Share of the photons that may come from no object, and of the counts that no photon made."""
+LEAST_NAMED_SHARE = 0.0005
+"""What would be told as 0.0 % is not."""
 USUAL_SHARE = 0.25
 """Share of the candidates that is kept where a photon costs `PHOTON_COST`; where fewer are, it costs more."""
 
@@ -25,11 +27,8 @@ def photon_findings(facts: Facts) -> list[Finding]:
         return []
     total = photons_per_view(facts, np.ones(facts.colour_share.size))
     findings = [_object_finding(facts, thing, total) for thing in facts.seen]
-    other_share = photons_per_view(facts, facts.other_share) / total
-    if other_share > MAX_OTHER_SHARE and facts.seen:
-        text = f"{other_share:.1%} of the photons come from no object"
-        remedy = "darken backdrop and lamps in view, or take more light"
-        findings.append(Finding("warn", "photons", text, remedy))
+    if facts.seen:
+        findings += _other_findings(facts, total)
     findings += _saturation_findings(facts)
     sensor, grid = facts.target.recipe.sensor, facts.grid
     dark = (sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts) * grid.height * grid.width
@@ -37,6 +36,26 @@ def photon_findings(facts: Facts) -> list[Finding]:
     if dark > MAX_OTHER_SHARE * (dark + total):
         text = f"{_number(dark)} dark counts per view, {dark / (dark + total):.0%} of all counts"
         findings.append(Finding("warn", "photons", text, "take more light, or a sensor with fewer"))
+    return findings
+
+
+def _other_findings(facts: Facts, total: float) -> list[Finding]:
+    """Which share of the photons comes from no object, and which from objects that count in no score."""
+    shares = {name: photons_per_view(facts, share) / total for name, share in facts.other_shares.items()}
+    findings, whole = [], sum(shares.values())
+    if whole >= LEAST_NAMED_SHARE:
+        parts = (f"{name} {part:.1%}" for name, part in shares.items() if part >= LEAST_NAMED_SHARE)
+        text = f"{whole:.1%} of the photons come from no object: {', '.join(parts)}"
+        if whole > MAX_OTHER_SHARE:
+            remedy = "set visible = false of the light from all around, darken the others, or take more light"
+            findings.append(Finding("warn", "photons", text, remedy))
+        else:
+            findings.append(Finding("ok", "photons", text))
+    unscored = [thing for thing in facts.seen if not thing.is_scored]
+    if unscored:
+        part = sum(photons_per_view(facts, thing.light_share) for thing in unscored) / total
+        text = f"{part:.1%} of the photons come from objects that count in no score"
+        findings.append(Finding("ok", "photons", text))
     return findings
 
 

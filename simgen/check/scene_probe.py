@@ -3,6 +3,7 @@
 import itertools
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -23,7 +24,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import AreaLight, SpotLight
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_at_centre, first_hits_of_view, shape_boxes_mm
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
@@ -79,8 +80,8 @@ class Facts:
     """What the findings rest on: a recipe with its scene, a coarse look at it, and a plan of the counts.
 
     Of the virtual centre's image: mean `luminance` in cd/m^2 (in spectral mode what its pixels see), shares
-    (C,) of its light that the pixels of each colour get, which sum to 1, and shares (C,) of the light in each
-    colour that come from no object. `corners` is the number of corner cameras: 4, or fewer of a single row;
+    (C,) of its light that the pixels of each colour get, which sum to 1, and by what is no object its shares
+    (C,) of the light in each colour. `corners` is the number of corner cameras: 4, or fewer of a single row;
     `lamps_away` are the lamps, from 1, that shine away from all objects. `plan` is None if the recipe wants
     no counts. The probe took `path_s` for a light path and `hit_s` for a first hit.
     """
@@ -90,7 +91,7 @@ class Facts:
     corners: int
     luminance: float
     colour_share: np.ndarray
-    other_share: np.ndarray
+    other_shares: Mapping[str, np.ndarray]
     lamps_away: tuple[int, ...]
     plan: Plan | None
     path_s: float
@@ -170,7 +171,7 @@ def probe_scene(target: Prepared) -> Facts:
         corners=len(corner_hits),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
         colour_share=weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum(),
-        other_share=_share(image[centre.object_id == 0].sum(axis=0), light),
+        other_shares=_other_shares(target.scene, centre, image),
         lamps_away=_lamps_away(target.scene, list(boxes.values())),
         plan=counting_plan,
         path_s=path_s,
@@ -201,6 +202,15 @@ def _picture(
 
 def _share(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0)
+
+
+def _other_shares(scene: Scene, centre: FirstHits, image: np.ndarray) -> dict[str, np.ndarray]:
+    """Shares (C,) of the light in each colour of what is no object, by its name."""
+    wall_mm, is_other = math.nan if scene.backdrop is None else scene.backdrop.z_mm, centre.object_id == 0
+    is_wall = is_other & np.isclose(centre.z_mm, wall_mm, rtol=1e-5)
+    masks = {"what shines from all around": is_other & np.isinf(centre.z_mm), "the backdrop": is_wall}
+    masks["lamps in view"] = is_other & np.isfinite(centre.z_mm) & ~is_wall
+    return {name: _share(image[mask].sum(axis=0), image.sum(axis=(0, 1))) for name, mask in masks.items()}
 
 
 def _is_cut(mask: np.ndarray) -> bool:

@@ -146,7 +146,7 @@ def _write_scene(
     growth = float(np.linalg.norm(to_world[:3, 0])) / scene.unit_mm
     lights = [_light(to_world @ matrix, values, growth) for matrix, values in scene.lamps]
     if not lights and not any("emission" in part.material for part in scene.parts):
-        lights.append({"type": "uniform", "luminance_cd_m2": 100.0})
+        lights.append({"type": "uniform", "luminance_cd_m2": 100.0, "visible": False})
         gltf.lose("the file has no light: the scene is lit evenly from all around")
     values = {"title": shorten(gltf.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
     valid = validate(Scene, values, f"{gltf.path}: the scene made of it")

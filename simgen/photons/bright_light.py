@@ -128,6 +128,8 @@ def mirrored_light(
     if not lamps.size:
         return []
     is_searched = ~is_known & with_straight
+    if setup.render_scene.hides_surroundings:
+        is_searched &= np.array(tracer.objects) >= 0
     arrivals, result = _arrivals(tracer, lamps, is_searched, film_light, least_radiance), []
     if arrivals.light.sum() <= LEAST_SHARE * film_light:
         return []

@@ -193,7 +193,7 @@ def _send_pilot(
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
         samples.append(sampler.trace(aimed, aimed.view.size, path_seed))
     contrast = float(surroundings.max() / mean.max())
-    if contrast >= MIN_CONTRAST:
+    if contrast >= MIN_CONTRAST and not setup.render_scene.hides_surroundings:
         openings, traced = _look_for_openings(setup, sampler, Samples.joined(samples).z_mm, contrast)
         samples.append(openings)
         paths += traced

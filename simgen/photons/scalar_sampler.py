@@ -126,10 +126,12 @@ class ScalarSampler(CandidateSampler):
             """Mean of all paths, less what shines at the first hit; no less than 0 for rounding."""
             sampler.seed(path_seed, 1)
             total = np.array(sum(integrate(scene, sampler, ray)[0] for _ in range(PATHS))) / PATHS
-            if not render_scene.shining:
+            if not (render_scene.shining or render_scene.hides_surroundings):
                 return total
             hit = scene.ray_intersect(ray)
-            lamp = hit.emitter(scene) if hit.is_valid() else None
+            if not hit.is_valid():
+                return 0 * total if render_scene.hides_surroundings else total
+            lamp = hit.emitter(scene)
             return total if lamp is None else np.maximum(total - np.array(lamp.eval(hit)), 0)
 
         if render_scene.filters is None:

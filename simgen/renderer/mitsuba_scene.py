@@ -35,7 +35,8 @@ class RenderScene:
     camera's pixels see of spectra, None where light is linear sRGB. `shining` is all that shines and can be
     seen but for what is all around, and `why_rendered` a clause on what the tracer of single photons does not
     cover. With `has_instances` some objects are instances of a group of shapes. The cameras stand in
-    `medium`, None for air.
+    `medium`, None for air. With `hides_surroundings` they see nothing of what shines from all around where
+    nothing is hit.
     """
 
     mi: Any
@@ -49,6 +50,7 @@ class RenderScene:
     has_instances: bool = False
     unscored: frozenset[int] = frozenset()
     medium: Any = None
+    hides_surroundings: bool = False
 
 
 def build(
@@ -85,8 +87,13 @@ def build(
             raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
         if scene.level is not None:
             referenced_lux = reference.illuminance_lux(scene.level.z_mm)
-    around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
-    surroundings = None if around is None else assets.environments[around.file]
+    around = scene.light_around
+    surroundings = assets.environments[around.file] if isinstance(around, EnvironmentLight) else None
+    hides_surroundings = around is not None and not around.visible
+    if hides_surroundings and has_media:
+        raise InputError(
+            f"{folder}: lights: one that is not visible does not go with a medium; leave out visible"
+        )
     gain = emission.level_gain(mi, scene, assets, surroundings, referenced_lux)
     plugins = _object_plugins(mi, scene, assets, gain, frame)
     if scene.backdrop is not None:
@@ -114,7 +121,8 @@ def build(
     object_of_shape = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
     object_of_shape[numbers] = [ids.get(shape.id(), 0) for shape in loaded.shapes()]
     seen = mi, loaded, object_of_shape, names, filters, tuple(shining), why_rendered, frame, has_instances
-    return RenderScene(*seen, frozenset(number for number, name in names.items() if name in unscored), medium)
+    unscored_numbers = frozenset(number for number, name in names.items() if name in unscored)
+    return RenderScene(*seen, unscored_numbers, medium, hides_surroundings)
 
 
 def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:

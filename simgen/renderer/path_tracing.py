@@ -95,7 +95,7 @@ def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) ->
     is_hit, missed = active & hit.is_valid(), active & ~hit.is_valid()
     shape = dr.select(is_hit, shape_number(render_scene, hit), 0)
     z_mm = dr.select(is_hit, render_scene.frame.z_mm(hit.p), dr.inf)
-    guess = hit.emitter(render_scene.scene, missed).eval(hit, missed)
+    guess = surroundings_seen(render_scene, hit, missed)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
     for lamp in _lamps(render_scene.scene):
         towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), is_hit)
@@ -104,6 +104,13 @@ def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) ->
     reflectance = bsdf.eval_diffuse_reflectance(hit, is_hit)
     guess += dr.select(is_hit, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
     return FirstHits(record, shape, z_mm, guess)
+
+
+def surroundings_seen(render_scene: RenderScene, hit: Any, missed: Any) -> Any:
+    """What a camera sees of what shines from all around, where its rays have missed everything."""
+    if render_scene.hides_surroundings:
+        return render_scene.mi.Spectrum(0)
+    return hit.emitter(render_scene.scene, missed).eval(hit, missed)
 
 
 def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
@@ -201,7 +208,7 @@ def radiance_along(
     tracer = _Tracer(render_scene, above)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
     is_hit = hit.is_valid()
-    radiance = hit.emitter(render_scene.scene, ~is_hit).eval(hit, ~is_hit)
+    radiance = surroundings_seen(render_scene, hit, ~is_hit)
     if max_depth == 1:
         return radiance
     bsdf = hit.bsdf(ray)

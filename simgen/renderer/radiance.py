@@ -7,7 +7,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.cameras.rig import Camera, Cameras, as_rig
-from simgen.renderer.backend import shape_numbers
+from simgen.renderer.backend import load_drjit, shape_numbers
 from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.renderer.mitsuba_shapes import WorldFrame
@@ -106,16 +106,36 @@ def _mean_of_paths(
         for number, curve in enumerate(render_scene.filters.sensitivity):
             plugin["film"][f"band{number}"] = spectrum_plugin(curve)
     sensor = mi.load_dict(plugin)
+    hidden = _surroundings_integrator(mi) if render_scene.hides_surroundings else None
     total, rest = np.zeros(()), samples
     for part in PARTS:
         while rest >= part:
-            seed = int(rng.integers(1 << 32))
-            image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=part, seed=seed))
+            film = {"sensor": sensor, "spp": part, "seed": int(rng.integers(1 << 32))}
+            image = np.array(mi.render(render_scene.scene, **film))
+            if hidden is not None:  # of the same rays, so that what is left has no noise of it
+                seen = np.array(mi.render(render_scene.scene, integrator=hidden, **film))
+                image = np.maximum(image - seen, 0)
             if part == samples:
                 return image
             total = total + part * image.astype(np.float64)
             rest -= part
     return (total / samples).astype(np.float32)
+
+
+def _surroundings_integrator(mi: Any) -> Any:
+    """What rays of a camera see of what shines from all around, and nothing else."""
+
+    class Surroundings(mi.SamplingIntegrator):
+        def sample(
+            self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
+        ) -> tuple[Any, Any, list[Any]]:
+            hit = scene.ray_intersect(ray, active)
+            missed = active & load_drjit().isinf(hit.t)
+            if missed is False:  # in scalar mode, where nothing shines at such a hit
+                return mi.Spectrum(0), missed, []
+            return hit.emitter(scene, missed).eval(hit, missed), missed, []
+
+    return Surroundings(mi.Properties())
 
 
 def windows_of_objects(

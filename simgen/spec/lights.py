@@ -114,6 +114,10 @@ class DirectionalLight(Strict):
     illuminant: Illuminant = "D65"
 
 
+Visible = Annotated[bool, Field(strict=True, exclude_if=lambda visible: visible)]
+"""Whether cameras see a light where nothing is hit. What is written of a scene has it where it is not so."""
+
+
 class UniformLight(Strict):
     """The same luminance from everywhere, seen by the cameras where nothing is hit."""
 
@@ -121,6 +125,8 @@ class UniformLight(Strict):
     luminance_cd_m2: Positive
     """Its luminance; a surface that sees nothing else gets pi times as many lux."""
     illuminant: Illuminant = "D65"
+    visible: Visible = True
+    """false: cameras see darkness where nothing is hit, and the light only in mirrors and through glass."""
 
 
 class EnvironmentLight(Strict):
@@ -137,10 +143,13 @@ class EnvironmentLight(Strict):
     """Luminance of white, pixels of (1, 1, 1)."""
     turn_deg: Real = 0.0
     """By how much the surroundings are turned to the right about the vertical axis."""
+    visible: Visible = True
+    """false: cameras see darkness where nothing is hit, and the image only in mirrors and through glass."""
 
 
+LightAround = UniformLight | EnvironmentLight
 Light = Annotated[
-    AreaLight | PointLight | SpotLight | DirectionalLight | UniformLight | EnvironmentLight,
+    AreaLight | PointLight | SpotLight | DirectionalLight | LightAround,
     Field(discriminator="type"),
 ]
 

@@ -31,7 +31,7 @@ from simgen.base.strict_models import (
     toml_text,
     validate,
 )
-from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
+from simgen.spec.lights import Level, Light, LightAround
 from simgen.spec.materials import Material, Reflectance
 from simgen.spec.mitsuba_file import MitsubaScene, MitsubaXml
 from simgen.spec.shapes import Shape
@@ -122,10 +122,15 @@ class Scene(Strict):
     planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES)] = ()
     """Depths at which something is in focus; what a recipe without `analysis.z_mm` looks at."""
 
+    @property
+    def light_around(self) -> LightAround | None:
+        """What shines from all around, if anything does."""
+        return next((light for light in self.lights if isinstance(light, LightAround)), None)
+
     @field_validator("lights")
     @classmethod
     def _one_from_all_around(cls, lights: tuple[Light, ...]) -> tuple[Light, ...]:
-        if sum(isinstance(light, UniformLight | EnvironmentLight) for light in lights) > 1:
+        if sum(isinstance(light, LightAround) for light in lights) > 1:
             raise ValueError("only one light can be 'uniform' or 'environment'")
         return lights
 

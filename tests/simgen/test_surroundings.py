@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from lit_scenes import ball
 from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from simgen.renderer import backend
+from simgen.truth.first_hits import first_hits_of_view
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVENLY = {"type": "uniform", "luminance_cd_m2": 1.0}
@@ -141,3 +143,23 @@ def test_photons_in_a_very_small_sun_do_not_take_forever(tmp_path: Path) -> None
     photons, log = thinned(built, film(), DEPTH, gain)
     assert abs(surprise(photons, view, film(), gain)) < 5
     assert log["kept_share"] > 0.2
+
+
+@pytest.mark.parametrize("kind", ["uniform", "environment"])
+def test_what_is_not_visible_lights_things_before_darkness(kind: str, tmp_path: Path) -> None:
+    light = EVENLY if kind == "uniform" else sky(tmp_path, sunny())
+    lights = light, light | {"visible": False}
+    shown, hidden = (made(THINGS[:2], [one], max_depth=DEPTH, folder=tmp_path) for one in lights)
+    lit, dark = seen(shown, film(), 64), seen(hidden, film(), 64)
+    hits = first_hits_of_view(hidden, film(), 0, 0)
+    is_whole = maximum_filter(hits.object_id, 3) == minimum_filter(hits.object_id, 3)
+    is_thing = hits.object_id > 0
+    np.testing.assert_array_equal(dark[is_whole & is_thing], lit[is_whole & is_thing])
+    assert not dark[is_whole & ~is_thing].any()
+    assert (dark <= lit).all()
+    gain = (5000 if SCALAR else 40_000) / dark.sum() * 3
+    photons, _ = thinned(hidden, film(), DEPTH, gain)
+    assert (photons.object_id > 0).all()
+    expected = seen(hidden, film(), 512)
+    assert abs(surprise(photons, expected, film(), gain)) < 5
+    assert surprise(photons, lit, film(), gain) > 5

@@ -45,7 +45,7 @@ def facts(*objects: ObjectFacts, recipe: dict[str, Any] | None = None, **more: A
         "corners": 4,
         "luminance": 1.0,
         "colour_share": np.array([0.25, 0.5, 0.25]),
-        "other_share": np.zeros(3),
+        "other_shares": {},
         "lamps_away": (),
         "plan": Plan(thins=True, samples=8, photons_per_view=1000.0),
         "path_s": 1e-7,
@@ -209,10 +209,15 @@ def test_few_photons_are_warned_of_and_the_remedy_gives_enough() -> None:
 
 def test_light_beside_the_objects_and_dark_counts_are_warned_of() -> None:
     one = thing("a", 540, share=0.01)
-    found = photon_findings(facts(one, other_share=np.full(3, 0.75)))
+    others = {"what shines from all around": np.full(3, 0.6), "lamps in view": np.full(3, 0.15)}
+    found = photon_findings(facts(one, other_shares=others))
     assert verdicts(found) == ["ok", "warn"]
-    assert "75.0%" in found[1].text
-    assert not photon_findings(facts(other_share=np.ones(3)))  # a wall alone is not to be darker
+    parts = "what shines from all around 60.0%, lamps in view 15.0%"
+    assert found[1].text == f"75.0% of the photons come from no object: {parts}"
+    found = photon_findings(facts(replace(one, is_scored=False), other_shares={"the backdrop": EVEN}))
+    assert verdicts(found) == ["ok", "ok", "ok"]
+    assert found[2].text == "25.0% of the photons come from objects that count in no score"
+    assert not photon_findings(facts(other_shares={"the backdrop": np.ones(3)}))  # a wall alone is not to be darker
     dark = photon_findings(facts(one, recipe={"sensor": {"dark_counts": 0.001}}))[-1]
     assert dark.verdict == "warn"  # 1049 a view beside 1000
     assert "51% of all counts" in dark.text
@@ -289,7 +294,8 @@ def test_the_probe_sees_the_share_of_light() -> None:
     known = probed(objects)
     white, black = known.objects
     np.testing.assert_allclose(black.light_share, 0, atol=0.01)  # but for pixels at its border
-    np.testing.assert_allclose(white.light_share + black.light_share + known.other_share, 1, rtol=1e-5)
+    sky_share = known.other_shares["what shines from all around"]
+    np.testing.assert_allclose(white.light_share + black.light_share + sky_share, 1, rtol=1e-5)
     # The white ball is as bright as the sky, and the black one is missing from the whole. Border pixels
     # are counted by their centres, which is wrong by some per cent on so coarse a film.
     expected = white.film_share / (1 - black.film_share)
