@@ -11,6 +11,7 @@ from pcii.base.srgb import srgb_to_linear
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.summary import mean_interval, sign_flip_p
+from pcii.evaluation.training_examples import examples
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
@@ -64,6 +65,7 @@ __all__ = [
     "depth_posterior",
     "estimate_depth",
     "evaluate",
+    "examples",
     "export_dataset",
     "import_arrays",
     "import_counts",

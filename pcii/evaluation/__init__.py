@@ -20,4 +20,5 @@ summary            Means of an evaluation with their intervals, and comparisons 
 tables             Tables of an evaluation as text, the same for HTML and Markdown.
 tasks              What an evaluation measures: every dataset at every light by every method, checked before
                    any work.
+training_examples  Examples to train on: parts of films in random poses, with light drawn anew.
 """

@@ -217,7 +217,9 @@ def test_light_beside_the_objects_and_dark_counts_are_warned_of() -> None:
     found = photon_findings(facts(replace(one, is_scored=False), other_shares={"the backdrop": EVEN}))
     assert verdicts(found) == ["ok", "ok", "ok"]
     assert found[2].text == "25.0% of the photons come from objects that count in no score"
-    assert not photon_findings(facts(other_shares={"the backdrop": np.ones(3)}))  # a wall alone is not to be darker
+    assert not photon_findings(
+        facts(other_shares={"the backdrop": np.ones(3)})
+    )  # a wall alone is not to be darker
     dark = photon_findings(facts(one, recipe={"sensor": {"dark_counts": 0.001}}))[-1]
     assert dark.verdict == "warn"  # 1049 a view beside 1000
     assert "51% of all counts" in dark.text

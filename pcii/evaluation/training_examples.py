@@ -1,0 +1,281 @@
+"""Examples to train on: parts of the films of datasets, in a random pose, with light that is drawn anew.
+
+All of it is exact. Photons that are kept at random are Poisson counts of less light. Where a film is mirrored
+or transposed its cameras are too, and so are its Bayer pattern, pitch and shear, so that disparities stay.
+"""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.evidence.texture_evidence import evidence_of_texture
+from pcii.metrics.true_masks import TrueFocus
+from pcii.sections.reconstruction import reconstruct
+from pcii.store.collection import Collection, Split, open_collection
+from pcii.store.dataset import Dataset
+from pcii.store.suggested_depths import depth_range_of
+from pcii.types.bayer import COLOURS, colour_index
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import total_disparity_px
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
+
+Field = Literal["counts", "sections", "evidence", "truth"]
+Example = dict[str, np.ndarray]
+SPLITS: tuple[Split, ...] = ("train", "validation", "test")
+CROP_STEP_PX = 4
+"""Parts begin at multiples of this: of Bayer patterns, and of the blocks of evidence."""
+
+
+def examples(
+    data: str | Path | Collection | Sequence[Dataset],
+    fields: Sequence[Field] = ("sections", "truth"),
+    *,
+    planes: int | Sequence[float] = 17,
+    split: Split | None = None,
+    shares: tuple[float, float, float] | None = None,
+    by: Literal["scene", "seed"] = "scene",
+    photons: tuple[float, float] | None = None,
+    crop_px: tuple[int, int] | None = None,
+    poses: bool = False,
+    seed: int | None = None,
+) -> "Examples":
+    """Datasets as a sequence of examples: dictionaries of arrays, as the `DataLoader` of PyTorch takes them.
+
+    `data` is a collection or its folder, or datasets. `fields` are what an example has:
+
+    * "counts": `counts` (K, L, H, W) int32.
+    * "sections": `sections` (Z, C, H, W) float32, photons per sample at each plane (Eq. 3).
+    * "evidence": `evidence` (Z, H / 2, W / 2) float32, the evidence of texture at each plane in nats.
+    * "truth": `z_mm` (H, W) float32, infinite where nothing is; `object_id` (H, W) int16; `in_focus`
+      (Z, H, W) bool; `plane` (H, W) int64, the nearest plane, -1 where nothing is, what is counts in no
+      score, or all planes are farther than half the largest distance between two.
+
+    `planes` are depths in mm, or a number of planes that are spread evenly in disparity over the depth range
+    of each dataset. `split` takes the datasets of one split: that of a collection of drawn scenes (see
+    `split_of`), or with `shares` of the three (in the order train, validation, test) by a hash of the scene,
+    so that no scene is in two of them, or `by` the seed of a single scene. `photons` are the least and the
+    most per view: each access draws a number in between, evenly by its logarithm but no more than the dataset
+    has, and keeps as many. `crop_px` (rows, columns) takes a part at a random place; `poses` mirrors at
+    random, and transposes where films or parts are square. Each access is another draw; with a `seed` it
+    follows from the seed, the `epoch` of the examples, which you count up, and the number.
+
+    Raises `InputError` for a field, split or number that cannot be, and on access for what a dataset lacks.
+    """
+    return Examples(_of_split(data, split, shares, by), tuple(fields), planes, photons, crop_px, poses, seed)
+
+
+@dataclass(eq=False)
+class Examples(Sequence[Example]):
+    """Examples of datasets; see `examples`. Each dataset is opened when one is asked for."""
+
+    datasets: Sequence[Dataset]
+    fields: tuple[Field, ...]
+    planes: int | Sequence[float]
+    photons: tuple[float, float] | None
+    crop_px: tuple[int, int] | None
+    poses: bool
+    seed: int | None
+    epoch: int = 0
+
+    def __post_init__(self) -> None:
+        known = Field.__args__
+        if not self.fields or not {*self.fields} <= {*known}:
+            raise InputError(f"fields: expected some of {', '.join(known)}, got {self.fields}")
+        if isinstance(self.planes, int) and self.planes < 2:
+            raise InputError(f"planes: expected at least 2, or depths in mm, got {self.planes}")
+        if self.photons is not None and not 0 < self.photons[0] <= self.photons[1] < math.inf:
+            raise InputError(f"photons: expected the least and the most per view, got {self.photons}")
+        if self.crop_px is not None and (min(self.crop_px) < 1 or np.any(np.mod(self.crop_px, CROP_STEP_PX))):
+            raise InputError(f"crop_px: expected multiples of {CROP_STEP_PX}, got {self.crop_px}")
+
+    def __len__(self) -> int:
+        return len(self.datasets)
+
+    def __getitem__(self, number: int) -> Example:  # pyright: ignore[reportIncompatibleMethodOverride]
+        dataset = self.datasets[number]
+        entropy = None if self.seed is None else (self.seed, self.epoch, number % len(self))
+        rng = np.random.default_rng(entropy)
+        pose = _Pose.drawn(dataset.grid, self.crop_px, self.poses, rng)
+        example: Example = {}
+        if {*self.fields} - {"truth"}:
+            counts = pose.of_counts(dataset.counts)
+            if self.photons is not None:
+                counts = _thinned(dataset, counts, self.photons, rng)
+            planes = self._planes_of(dataset, counts.grid)
+            if "counts" in self.fields:
+                example["counts"] = counts.dense.astype(np.int32)
+            if "sections" in self.fields:
+                estimate = reconstruct(counts, planes).estimate
+                example["sections"] = np.ascontiguousarray(np.moveaxis(estimate, 3, 1), np.float32)
+            if "evidence" in self.fields:
+                example["evidence"] = evidence_of_texture(counts, planes).nats
+        if "truth" in self.fields:
+            if dataset.truth is None:
+                raise InputError(f"{dataset.path}: has no truth, which the field 'truth' is made of")
+            grid = pose.of_grid(dataset.grid)
+            example |= _truth_fields(pose.of_truth(dataset.truth), self._planes_of(dataset, grid))
+        return example
+
+    def _planes_of(self, dataset: Dataset, grid: CameraGrid) -> FocalPlanes:
+        if not isinstance(self.planes, int):
+            return FocalPlanes.at_depths(grid, self.planes)
+        near_px, far_px = total_disparity_px(grid, np.array(depth_range_of(dataset)))
+        return FocalPlanes.at_total_disparity(grid, np.linspace(near_px, far_px, self.planes))
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """A part of a film, mirrored along `flips` (0 rows, 1 columns), then maybe transposed."""
+
+    rows: slice
+    cols: slice
+    flips: tuple[int, ...]
+    is_transposed: bool
+
+    @classmethod
+    def drawn(
+        cls, grid: CameraGrid, crop_px: tuple[int, int] | None, poses: bool, rng: np.random.Generator
+    ) -> "_Pose":
+        height, width = crop_px or grid.shape_HW
+        if height > grid.height or width > grid.width:
+            raise InputError(f"crop_px: {height} x {width} is larger than {grid.height} x {grid.width} px")
+        top, left = (
+            CROP_STEP_PX * int(rng.integers((whole - part) // CROP_STEP_PX + 1))
+            for whole, part in ((grid.height, height), (grid.width, width))
+        )
+        draws = rng.random(3) < 0.5 if poses else (False, False, False)
+        flips = tuple(axis for axis in range(2) if draws[axis])
+        is_transposed = bool(draws[2]) and height == width
+        return cls(slice(top, top + height), slice(left, left + width), flips, is_transposed)
+
+    def of_map(self, values: np.ndarray) -> np.ndarray:
+        """The part of a map (H, W, ...)."""
+        part = np.flip(values[self.rows, self.cols], self.flips)
+        return np.ascontiguousarray(part.swapaxes(0, 1) if self.is_transposed else part)
+
+    def of_grid(self, grid: CameraGrid) -> CameraGrid:
+        """The cameras of the part. Their axes meet it anywhere, on which no disparity depends."""
+        size = {"height": self.rows.stop - self.rows.start, "width": self.cols.stop - self.cols.start}
+        grid = replace(grid, **size)
+        if not self.is_transposed:
+            return grid
+        turned = {"rows": grid.cols, "cols": grid.rows, "height": grid.width, "width": grid.height}
+        return replace(grid, **turned, pitch_mm=grid.pitch_mm[::-1], shear_px=grid.shear_px[::-1])
+
+    def of_counts(self, counts: PhotonCounts) -> PhotonCounts:
+        """The photons of the part, in cameras that are mirrored and transposed with it."""
+        grid, events = counts.grid, counts.events
+        here = (events.i >= self.rows.start) & (events.i < self.rows.stop)
+        here &= (events.j >= self.cols.start) & (events.j < self.cols.stop)
+        k, l, n = events.k[here], events.l[here], events.n[here]
+        i, j = events.i[here] - self.rows.start, events.j[here] - self.cols.start
+        if 0 in self.flips:
+            k, i = grid.rows - 1 - k, self.rows.stop - self.rows.start - 1 - i
+        if 1 in self.flips:
+            l, j = grid.cols - 1 - l, self.cols.stop - self.cols.start - 1 - j
+        if self.is_transposed:
+            k, l, i, j = l, k, j, i
+        cfa = counts.cfa
+        if cfa is not None:
+            cells = self.of_map(colour_index(*grid.shape_HW, cfa))[:2, :2]
+            cfa = "".join(COLOURS[colour] for colour in cells.ravel())
+        frames, bits = counts.readout.frames, counts.readout.bits
+        return PhotonCounts.from_events(k, l, i, j, n, self.of_grid(grid), cfa=cfa, frames=frames, bits=bits)
+
+    def of_truth(self, truth: Truth) -> Truth:
+        """The truth of the part."""
+        return replace(
+            truth,
+            z_mm=self.of_map(truth.z_mm),
+            object_id=self.of_map(truth.object_id),
+            photons=None,
+            normal=None,
+            coverage=None,
+            visible_views=None,
+        )
+
+
+def _thinned(
+    dataset: Dataset, counts: PhotonCounts, photons: tuple[float, float], rng: np.random.Generator
+) -> PhotonCounts:
+    """Counts of less light: of a number of photons per view that is drawn between two, or all there are."""
+    if counts.readout.bits is not None:
+        raise InputError(
+            f"{dataset.path}: has frames of {counts.readout.bits} bits, of which no less light can be drawn; "
+            "leave out photons"
+        )
+    light, views = dataset.light, dataset.grid.view_count
+    is_stated = light.photons is not None and light.scope == "view"
+    most = light.photons if is_stated else dataset.counts.total / views
+    assert most is not None
+    if photons[0] > most:
+        raise InputError(f"{dataset.path}: has {most:.4g} photons per view, fewer than photons[0] asks for")
+    wanted = math.exp(rng.uniform(*np.log(photons)))
+    return counts.subsample(counts.total * min(wanted / most, 1.0), rng)
+
+
+def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
+    at_px = total_disparity_px(planes.grid, planes.z_mm)
+    order = np.argsort(at_px)
+    with np.errstate(invalid="ignore"):
+        own_px = total_disparity_px(planes.grid, truth.z_mm)
+    after = np.searchsorted(at_px[order], own_px).clip(1, len(planes) - 1)
+    near = own_px - at_px[order][after - 1] < at_px[order][after] - own_px
+    plane = order[after - near]
+    reach_px = np.diff(at_px[order]).max() / 2
+    is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (np.abs(at_px[plane] - own_px) <= reach_px)
+    return {
+        "z_mm": truth.z_mm.astype(np.float32),
+        "object_id": truth.object_id.astype(np.int16),
+        "in_focus": TrueFocus(planes, truth).by_pixel,
+        "plane": np.where(is_known, plane, -1).astype(np.int64),
+    }
+
+
+def _of_split(
+    data: str | Path | Collection | Sequence[Dataset],
+    split: Split | None,
+    shares: tuple[float, float, float] | None,
+    by: Literal["scene", "seed"],
+) -> Sequence[Dataset]:
+    """The datasets of a split; `InputError` for one that there is not, or that would be empty."""
+    data = open_collection(data) if isinstance(data, str | Path) else data
+    if split is None:
+        return data
+    if split not in SPLITS or by not in ("scene", "seed"):
+        raise InputError(
+            f"split, by: expected one of {', '.join(SPLITS)}, and scene or seed, got {split}, {by}"
+        )
+    if isinstance(data, Collection):
+        keys = [{"scene": (row["scene"], row["scene_number"]), "seed": row["seed"]} for row in data.rows]
+        own = [row["split"] for row in data.rows]
+    else:
+        recipes = [dataset.manifest.recipe for dataset in data]
+        keys = [{"scene": (r.get("scene"), r.get("scene_number")), "seed": r.get("seed")} for r in recipes]
+        own = [None] * len(keys)
+    if shares is not None:
+        if min(shares) < 0 or not math.isclose(sum(shares), 1, abs_tol=1e-6):
+            raise InputError(f"shares: expected three shares that sum to 1, got {shares}")
+        ends = np.cumsum(shares)
+        own = [SPLITS[min(int(np.searchsorted(ends, _hashed(key[by]), "right")), 2)] for key in keys]
+    elif None in own:
+        raise InputError("shares: missing; scenes that are not drawn have no split of their own")
+    mask = [one == split for one in own]
+    if not any(mask):
+        raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by='seed'")
+    if isinstance(data, Collection):
+        return data[mask]
+    return [dataset for dataset, is_wanted in zip(data, mask, strict=True) if is_wanted]
+
+
+def _hashed(key: object) -> float:
+    """A number from 0 to 1 that a key has everywhere."""
+    return int.from_bytes(hashlib.sha256(repr(key).encode()).digest()[:8], "big") / 2**64
