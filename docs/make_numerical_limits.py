@@ -36,6 +36,8 @@ CONDITIONS = {
 SCENES = {f"simgen.spec.{name}" for name in ("scene", "lights", "materials", "shapes")}
 NO_NUMBERS = {
     "Collection": "a table of datasets",
+    "Examples": "a sequence of examples",
+    "examples": "checks its options, and data as `PhotonCounts` and `Truth` are",
     "FocalPlanes": "checked as `z_mm` of `reconstruct` is",
     "TrueFocus": "made of a `Truth`",
     "mean_interval": "means of scores",

@@ -11,7 +11,7 @@ from pcii.base.srgb import srgb_to_linear
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.summary import mean_interval, sign_flip_p
-from pcii.evaluation.training_examples import examples
+from pcii.evaluation.training_examples import Examples, examples
 from pcii.exchange.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
@@ -44,6 +44,7 @@ __all__ = [
     "Dataset",
     "DepthMap",
     "DepthPosterior",
+    "Examples",
     "FocalPlanes",
     "FrameFormat",
     "InputError",

@@ -46,6 +46,11 @@ def given_collections(request: pytest.FixtureRequest) -> None:
     simgen.generate_collection("training.toml", "out/training", ["scene_number={ range = [0, 2] }"])
 
 
+def given_training(request: pytest.FixtureRequest) -> None:
+    overrides = [*TINY, "scene=drawn_plain", "scene_number={ range = [0, 2] }", "photons.budget=500"]
+    simgen.generate_collection("paper", "out/training", overrides)
+
+
 def given_exchange(request: pytest.FixtureRequest) -> None:
     shutil.copytree(request.getfixturevalue("nested_dataset"), "out/small")
     write_card(Path("out/small"), Terms())

@@ -68,6 +68,12 @@ def run(
     about = {"authors": authors, "url": url, "trained_on": trained_on}
     with Stages() as report:
         opened = open_benchmark(data, half)
+        if opened.missing:
+            whole = len(opened.datasets) + opened.missing
+            say(
+                f"{data}: {opened.missing} of {whole} datasets of the {half} half are missing; the scores are"
+            )
+            say(f"of the others. `simgen benchmark make -o {data}` goes on with it")
         evaluation = run_method(
             method, opened, out, budgets=budget, executor=executor, report=report, **about
         )

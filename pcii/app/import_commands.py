@@ -10,6 +10,7 @@ from pcii.app.command_options import Depths, Out
 from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
+from pcii.depth.methods import find_surfaces
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.exchange.camera_fit import CameraFit, check_grid
 from pcii.exchange.depth_files import NO_DEPTH, DepthFile
@@ -106,8 +107,8 @@ def import_dataset(
     seed
         Seed of these counts; 1 by default.
     z_mm
-        Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: where
-        things are sharpest.
+        Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: of photon
+        counts with a range where the depth map has most surfaces, else where things are sharpest.
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
     """
@@ -132,11 +133,12 @@ def import_dataset(
         z_range = z_range_mm or imported.z_range_mm
         truth = true_depth.truth_for(imported.images.grid, notes.append) or imported.truth
         fit = check_grid(_without_hot_pixels(imported.images, notes.append), z_range, order=order)
+        surfaces = _surfaces_of(imported.images, z_range, notes.append) if not z_mm else ()
         dataset = save_dataset(
             out,
             images,
             truth,
-            z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
+            z_mm=z_mm or [float(f"{z:.3g}") for z in surfaces or fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
             title=source.resolve().name,
@@ -154,7 +156,8 @@ def import_dataset(
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
-    _say_depths(fit)
+    if not surfaces:
+        _say_depths(fit)
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
@@ -173,6 +176,17 @@ def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | Pho
         share = f"{hot} of {grid.height * grid.width} pixels"
         tell(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
     return cleaned
+
+
+def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, tell: Tell) -> tuple[float, ...]:
+    """Depths of the surfaces of photon counts within a range, in whose noise contrast is no sure sign."""
+    if isinstance(images, Views) or z_range is None or images.grid.view_count < 2:
+        return ()
+    depths_mm, sure = find_surfaces(images, z_range)
+    if depths_mm:
+        names = ", ".join(map(_three_digits, depths_mm))
+        tell(f"the depth map has most surfaces at {names} mm; its depths are right with {sure:.0%}")
+    return depths_mm
 
 
 def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:

@@ -21,8 +21,7 @@ from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
-from pcii.depth.depth_planes import modes_mm
-from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_surfaces
 from pcii.figures.exposure import encoded
 from pcii.figures.panels import figure_bytes, new_figure
 from pcii.figures.pictures import mask_image, write_png
@@ -90,11 +89,9 @@ def run(
 
 def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: str) -> FocalPlanes:
     """Planes where the depth map has most surfaces, which are said; `InputError` if it has none."""
-    depth_map = estimate_depth(data.counts_or_views, z_range_mm, method=method)
-    depths_mm = modes_mm(depth_map, data.grid)
+    depths_mm, sure = find_surfaces(data.counts_or_views, z_range_mm, method)
     if not depths_mm:
         raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
-    sure = float(depth_map.confidence[np.isfinite(depth_map.z_mm)].mean())
     names = ", ".join(f"{z:.4g}" for z in depths_mm)
     say(f"looking at {names} mm, where the depth map has most surfaces; its depths are right with {sure:.0%}")
     return FocalPlanes.at_depths(data.grid, depths_mm)

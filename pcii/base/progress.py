@@ -24,7 +24,8 @@ def silent(stage: str, done: int, total: int) -> None:
 class Stages(AbstractContextManager["Stages"]):
     """Progress of named stages: bars on a terminal, else a line every ten seconds, with the time left.
 
-    Call it as stages(name, done, total); a stage ends when done reaches total.
+    Call it as stages(name, done, total); a stage ends when done reaches total, and begins anew when less is
+    done than before.
     """
 
     def __init__(self) -> None:
@@ -32,6 +33,7 @@ class Stages(AbstractContextManager["Stages"]):
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._begun: dict[str, float] = {}
+        self._done: dict[str, int] = {}
         self._logged: dict[str, float] = {}
 
     def __enter__(self) -> "Stages":
@@ -60,6 +62,12 @@ class Stages(AbstractContextManager["Stages"]):
             self._show(visible(stage), done, total)
 
     def _show(self, stage: str, done: int, total: int) -> None:
+        is_anew, self._done[stage] = done < self._done.get(stage, 0), done
+        if is_anew:
+            self._begun.pop(stage, None)
+            self._logged.pop(stage, None)
+            if self._bars is not None:
+                self._bars.reset(self._tasks[stage])
         if self._bars is not None:
             if stage not in self._tasks:
                 self._tasks[stage] = self._bars.add_task(stage, total=total)

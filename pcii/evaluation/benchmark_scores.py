@@ -30,6 +30,7 @@ from pcii.evaluation.tasks import Task, tasks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.collection import (
     BENCHMARK_FIELDS,
+    INDEX,
     Collection,
     Half,
     is_collection,
@@ -48,27 +49,36 @@ TYPICAL_PHOTONS = 1000.0
 
 @dataclass(frozen=True)
 class BenchmarkHalf:
-    """The datasets of one half of a benchmark, and by the name of each that in full light of its scene."""
+    """The datasets of one half of a benchmark, and by the name of each that in full light of its scene.
+
+    `missing` is how many of the half are not made yet.
+    """
 
     benchmark: str
     half: Half
     datasets: Sequence[Dataset]
     full_light: Mapping[str, Dataset]
+    missing: int = 0
 
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
     if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
+    recipe, goes_on = read_collection(path).recipe, f"`simgen benchmark make -o {path}` goes on with it"
+    if not (path / INDEX).is_file():
+        raise InputError(f"{path}: the benchmark is unfinished; {goes_on}")
     collection = open_collection(path)
     chosen: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
     if not len(chosen):
-        raise InputError(f"{path}: has no dataset of the {half} half; `simgen benchmark make` makes it")
+        raise InputError(f"{path}: has no dataset of the {half} half yet; {goes_on}")
     datasets = list(chosen)
     scenes = {row["path"]: row["values"]["name"] for row in chosen.rows}
     lit = {scenes[each.name]: each for each in datasets if each.light == FULL_LIGHT}
     full_light = {name: lit[scene] for name, scene in scenes.items() if scene in lit}
-    return BenchmarkHalf(read_collection(path).recipe["name"], half, datasets, full_light)
+    scenes_of_half = [scene for scene in recipe["scene"] if scene["half"] == half]
+    expected = sum(len(recipe["seeds"]) + bool(scene["frames"]) + 1 for scene in scenes_of_half)
+    return BenchmarkHalf(recipe["name"], half, datasets, full_light, expected - len(datasets))
 
 
 class BenchmarkJob(EvaluationJob):

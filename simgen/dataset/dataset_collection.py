@@ -68,7 +68,9 @@ def generate_collection(
         _begin(series, out)
         report("datasets", 0, len(pieces))
         try:
-            with closing(executor.run(DatasetJob(series, out), pieces)) as results:
+            # Other processes would have to send what they report.
+            within = silent if executor.workers > 1 or executor.scheduler is not None else report
+            with closing(executor.run(DatasetJob(series, out, within), pieces)) as results:
                 for _, result in results:
                     if isinstance(result, str):
                         faults.append(result)
@@ -83,8 +85,8 @@ def generate_collection(
 class DatasetJob:
     """Makes datasets of `series` in the folder `out`; keeps what one has in common with the next."""
 
-    def __init__(self, series: Series, out: Path) -> None:
-        self.series, self.out, self.reuse = series, out, Reuse()
+    def __init__(self, series: Series, out: Path, report: Report = silent) -> None:
+        self.series, self.out, self.report, self.reuse = series, out, report, Reuse()
         self.versions = decisive_versions()
 
     def __call__(self, piece: int) -> Row | str:
@@ -99,7 +101,7 @@ class DatasetJob:
             prepared = prepare(self.series.recipe(piece), self.series.recipe_folder)
             # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
             manifest = find_finished(folder, prepared.identity, content=False)
-            manifest = manifest or make(prepared, folder, silent, self.reuse)
+            manifest = manifest or make(prepared, folder, self.report, self.reuse)
         except InputError as fault:
             return str(fault)
         return index_row(folder.name, self.series.values(piece), manifest, folder / MANIFEST)

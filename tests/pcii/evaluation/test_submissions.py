@@ -18,6 +18,7 @@ from pcii.evaluation.benchmark_page import COMPARISONS, write_page
 from pcii.evaluation.benchmark_scores import BenchmarkHalf, open_benchmark, run_method, score_submission
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.submissions import SUBMISSION, read_maps, tasks_of_submission
+from pcii.store.collection import INDEX, read_index, write_index
 from pcii.store.verification import verify
 
 pytestmark = pytest.mark.renders
@@ -157,6 +158,23 @@ def test_submissions_with_faults_are_answered_in_a_sentence(
     with pytest.raises(InputError, match=says):
         score_submission(broken, data, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_unfinished_benchmark_names_the_command_that_goes_on(
+    small_benchmark: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert open_benchmark(small_benchmark, HALF).missing == 0
+    part = tmp_path / "part"
+    shutil.copytree(small_benchmark, part)
+    write_index(part, [row for row in read_index(part) if "photons" not in row["path"]])
+    command = ["benchmark", "run", "brightness", "--data", str(part), "-o", str(tmp_path / "out")]
+    assert command_line.run(app, [*command, "--half", HALF]) == 0
+    said = capsys.readouterr().out
+    assert f"{part}: 3 of 5 datasets of the {HALF} half are missing" in said
+    assert f"`simgen benchmark make -o {part}` goes on with it" in said
+    (part / INDEX).unlink()
+    with pytest.raises(InputError, match=r"unfinished; `simgen benchmark make -o .*` goes on with it"):
+        open_benchmark(part, HALF)
 
 
 @pytest.mark.parametrize("dtype", ["<f8", ">f4", "<f2", ">u2", "?"])

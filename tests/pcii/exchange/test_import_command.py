@@ -16,7 +16,7 @@ from PIL import Image
 from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm
 
-from pcii import CameraGrid, open_dataset
+from pcii import CameraGrid, open_dataset, sample
 from pcii.base.srgb import linear_to_srgb
 from pcii.store.verification import verify
 
@@ -56,6 +56,19 @@ def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
     assert "300 photons expected in each view, seed 1" in dataset.manifest["origin"]
     assert verify(out) > 10
     assert run("import", photos, "-o", out, *NAMED, *limits) == 2  # the folder is not empty
+
+
+def test_surfaces_of_photon_counts_are_where_the_depth_map_has_them(tmp_path: Path, capsys) -> None:
+    np.save(tmp_path / "counts.npy", sample().counts.dense)
+    cameras = ["--pitch-mm", 13.5, 13.5, "--focal-mm", 50, "--pixel-mm", 0.1408]
+    limits = ["--counts", "--cfa", "GRBG", "--z-range-mm", 450, 750]
+    assert run("import", tmp_path / "counts.npy", "-o", tmp_path / "out", *cameras, *limits) == 0
+    said = capsys.readouterr().out
+    (found,) = re.findall(r"the depth map has most surfaces at (.*) mm; its depths are right with \d+%", said)
+    depths_mm = [float(z) for z in found.split(", ")]
+    assert depths_mm == pytest.approx([539, 618], abs=8)  # medians of the ball and the bird; 15 mm are 1 px
+    assert open_dataset(tmp_path / "out").analysis["z_mm"] == depths_mm
+    assert "sharpest" not in said
 
 
 @pytest.mark.parametrize(
