@@ -12,7 +12,7 @@ from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.summary import mean_interval, sign_flip_p
 from pcii.evaluation.training_examples import Examples, examples
-from pcii.exchange.camera_fit import check_grid
+from pcii.evidence.camera_fit import check_grid
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
 from pcii.exchange.frame_formats import FrameFormat

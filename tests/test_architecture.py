@@ -56,7 +56,7 @@ NOT_SHARED = {
     "pcii.types.focal_planes",
     "pcii.types.geometry",
     "pcii.types.section_stack",
-    "pcii.exchange.camera_fit",
+    "pcii.evidence.camera_fit",
     "pcii.store.suggested_depths",
 }
 MOST_FILES, FEWEST_FILES = 14, 2

@@ -14,6 +14,7 @@ from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
+from pcii.exchange.export_command import export
 from pcii.store.dataset import copy_sample
 from pcii.store.verification import verify_and_tell
 
@@ -22,7 +23,7 @@ app = command_line.command_app(
 )
 
 app.command(import_dataset, name="import")
-for command in (run, reconstruct, depth, segment, score, benchmark):
+for command in (run, reconstruct, depth, segment, score, benchmark, export):
     app.command(command)
 
 

@@ -11,8 +11,8 @@ from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.depth.methods import find_surfaces
+from pcii.evidence.camera_fit import CameraFit, check_grid
 from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.exchange.camera_fit import CameraFit, check_grid
 from pcii.exchange.depth_files import NO_DEPTH, DepthFile
 from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
 from pcii.exchange.import_requests import (

@@ -1,5 +1,6 @@
 """Evidence of depth in photon counts: at which plane texture is sharp, and whether a depth is shown at all.
 
+camera_fit          Do views fit the stated cameras? Where they are sharp, and which order or shift does.
 hot_pixels          Hot pixels at the same place of all cameras, which belong to the sensor and not to the
                     scene.
 octave_kernels      Compiled: means of the blocks of a section, and the evidence of octaves, from fine to

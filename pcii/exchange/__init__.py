@@ -1,9 +1,9 @@
 """What comes in and goes out: images made by others are read, datasets are written for other tools.
 
 array_files      Arrays in files of NumPy, MATLAB and HDF5.
-camera_fit       Do views fit the stated cameras? Where they are sharp, and which order or shift does.
 count_arrays     Arrays of light and of photon counts, and photon cubes, whose frames are added up.
 depth_files      A map of true depth as the truth of imported views.
+export_command   The command `export` of `pcii` and `simgen`.
 export_formats   The formats that datasets are written in, by name; and those of single photons: events
                  and photon cubes.
 export_pictures  Pictures of 8 bits of all views, and the folder of pictures and poses for nerfstudio.

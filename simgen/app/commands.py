@@ -1,7 +1,7 @@
 """The `simgen` command: datasets, and what they are made with."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
@@ -9,6 +9,7 @@ from pcii.base import command_line
 from pcii.base.command_line import answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
+from pcii.exchange.export_command import export
 from pcii.store.collection import Half
 from simgen.app.scene_commands import (
     Json,
@@ -28,7 +29,7 @@ app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
-for command in (scenes, schema, check, preview, new_scene, new_recipe, import_scene):
+for command in (scenes, schema, check, preview, new_scene, new_recipe, import_scene, export):
     app.command(command)
 
 benchmark = App(
@@ -206,44 +207,6 @@ def sheet(dataset: Path, *, out: Out) -> None:
     write_sheet(dataset, out)
     say(f"{out}")
     say_next("pcii", "run", dataset, "-o", results_folder(dataset))
-
-
-@app.command
-def export(
-    dataset: Path,
-    *,
-    format: Literal["hci", "nerfstudio", "photoncube", "events"],
-    out: Out,
-    budget: float | None = None,
-) -> None:
-    """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.
-
-    hci: the layout of the HCI 4D light field benchmark. nerfstudio: a PNG for each view and transforms.json
-    with the poses of the cameras, as neural reconstruction reads them. photoncube: the binary frames of each
-    view as packed bits, with poses. events: a NumPy archive of photons, cameras and truth. Each dataset of a
-    collection is written to a folder in the new one that has its name.
-
-    Examples of use:
-
-        simgen export out/paper --format events -o out/paper-events
-        simgen export out/small --format nerfstudio -o out/small-poses
-        simgen export out/spad --format photoncube -o out/spad-cubes
-
-    Parameters
-    ----------
-    dataset
-        Folder of a dataset or of a collection.
-    out
-        Folder for the files: new or empty.
-    budget
-        Export the photons of this smaller, nested budget of the recipe.
-    """
-    from pcii.exchange.export_formats import export_dataset
-
-    with Stages() as report:
-        folder = export_dataset(dataset, format, out, budget=budget, report=report)
-    files = [file for file in folder.rglob("*") if file.is_file()]
-    say(f"{folder}: {len(files)} files, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")
 
 
 @app.command

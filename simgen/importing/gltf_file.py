@@ -157,6 +157,8 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
     """JSON and binary part of a .gltf or .glb file (section 4 of the specification)."""
     if not content.startswith(b"glTF"):
         return content, b""
+    if content[4:8] == (1).to_bytes(4, "little"):
+        raise InputError(f"{path}: is glTF 1.0, which is not read; export it as glTF 2.0")
     chunks, at = {b"JSON": b"", b"BIN\0": b""}, 12
     while at + 8 <= len(content):
         end = at + 8 + int.from_bytes(content[at : at + 4], "little")
