@@ -193,13 +193,14 @@ def import_scene(
     *,
     out: Out,
     camera: str | None = None,
-    unit: Literal["mm", "cm", "m", "in", "ft"] = "m",
+    unit: Literal["mm", "cm", "m", "in", "ft"] | None = None,
+    up: Literal["y", "z"] = "y",
     place_at_mm: tuple[float, float, float] | None = None,
     fit_mm: float | None = None,
     emission_unit: Literal["nit", "watt"] = "nit",
     unscored: tuple[str, ...] = (),
 ) -> None:
-    """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
+    """Make a scene of a glTF file (.glb, .gltf), a mesh (.obj, .ply, .stl) or a Mitsuba scene (.xml).
 
     Objects keep their names. The scene stands before a camera of the file, or where you say. What cannot
     be represented is listed.
@@ -209,6 +210,7 @@ def import_scene(
         simgen import-scene room.glb -o scenes/room
         simgen import-scene duck.glb -o scenes/duck --place-at-mm 0 0 600 --fit-mm 150
         simgen import-scene blender.glb -o scenes/blender --emission-unit watt
+        simgen import-scene bracket.stl -o scenes/bracket --unit mm --up z --place-at-mm 0 0 600
 
     Parameters
     ----------
@@ -219,7 +221,9 @@ def import_scene(
     camera
         The camera of the file that becomes the virtual centre, if it has several.
     unit
-        The file's unit of length.
+        The file's unit of length. Default: metres; meshes have none.
+    up
+        Which axis of a mesh is up; away is then -Z, or with z up Y.
     place_at_mm
         X, Y and Z of the middle of the scene, upright, instead of a camera.
     fit_mm
@@ -232,7 +236,7 @@ def import_scene(
     """
     from simgen.importing.scene_import import import_scene
 
-    place = {"camera": camera, "unit": unit, "place_at_mm": place_at_mm, "fit_mm": fit_mm}
+    place = {"camera": camera, "unit": unit, "up": up, "place_at_mm": place_at_mm, "fit_mm": fit_mm}
     for line in import_scene(file, out, **place, emission_unit=emission_unit, unscored=unscored).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")

@@ -25,7 +25,7 @@ from simgen.base.strict_models import shorten
 
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _FACES = ("vertex_indices", "vertex_index")
-_LEFT_OUT = {"", "mtllib", "usemtl", "o", "g", "s", "mg", "l", "p", "vp", "lod", "usemap", "maplib"}
+_LEFT_OUT = {"", "s", "mg", "l", "p", "vp", "lod", "usemap", "maplib"}
 """Statements of OBJ files that change no surface: materials, groups, points and lines."""
 
 
@@ -189,10 +189,19 @@ def _parsed_ply(data: bytes) -> PlyData:
 
 
 def _read_obj(data: bytes) -> Triangles:
-    """Raises `ValueError` with the end of a sentence if there is no mesh.
+    """All that is in an OBJ file as one mesh; raises `ValueError` as `obj_parts` does."""
+    return obj_parts(data, as_one=True)[1]["", ""]
 
-    Statements that change no surface are left out; others, such as curved surfaces, are refused.
+
+def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tuple[str, str], Triangles]]:
+    """The material files that an OBJ file names, and its meshes by the names of group and material.
+
+    Raises `ValueError` with the end of a sentence if there is no mesh. Statements that change no surface are
+    left out; others, such as curved surfaces, are refused.
     """
+    libraries: list[str] = []
+    groups: dict[tuple[str, str], int] = {}
+    group, material, owners = "", "", list[int]()
     points: dict[str, list[list[float]]] = {"v": [], "vt": [], "vn": []}
     corners: list[list[int]] = []
     counts: list[int] = []
@@ -204,6 +213,13 @@ def _read_obj(data: bytes) -> Triangles:
                 sizes = [len(values) for values in points.values()]
                 corners += [_corner(word, sizes) for word in words]
                 counts.append(len(words))
+                owners.append(groups.setdefault(("", "") if as_one else (group, material), len(groups)))
+            elif keyword in ("o", "g"):
+                group = " ".join(words)
+            elif keyword == "usemtl":
+                material = " ".join(words)
+            elif keyword == "mtllib":
+                libraries += words
             elif keyword == "vt":
                 u, v = [*words, "0"][:2]  # v may be left out
                 points["vt"].append([float(u), float(v)])
@@ -216,18 +232,27 @@ def _read_obj(data: bytes) -> Triangles:
             raise ValueError(f"has a line {number} that cannot be used: {line.strip()[:60]!r}") from None
     if not corners:
         raise ValueError("has no faces")
-    # One vertex for each combination of position, texture coordinate and normal that occurs.
-    triples = np.array(corners).reshape(-1, 3)
+    owner, number_of, all_corners = np.array(owners), np.array(counts), np.array(corners).reshape(-1, 3)
+    values = [np.array(one) for one in points.values()]
+    parts = {}
+    for name, own in groups.items():
+        triples = all_corners[np.repeat(owner == own, number_of)]
+        parts[name] = _obj_mesh(values, triples, number_of[owner == own])
+    return libraries, parts
+
+
+def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray) -> Triangles:
+    """The mesh of polygons with `counts` corners, each the numbers of a position, coordinate and normal."""
+    # One vertex for each combination of them that occurs.
     triples[:, (triples < 0).any(axis=0)] = -1  # of these some corners have none
-    uv_count, normal_count = len(points["vt"]) + 1, len(points["vn"]) + 1
+    uv_count, normal_count = (len(one) + 1 for one in values[1:])
     keys = triples @ [uv_count * normal_count, normal_count, 1]
     _, first, vertices = np.unique(keys, return_index=True, return_inverse=True)
     positions, uv, normals = (
-        np.array(values)[own] if own[0] >= 0 else None
-        for values, own in zip(points.values(), triples[first].T, strict=True)
+        one[own] if own[0] >= 0 else None for one, own in zip(values, triples[first].T, strict=True)
     )
     assert positions is not None
-    return Triangles.checked(positions, fan_all(vertices.ravel(), np.array(counts)), normals, uv)
+    return Triangles.checked(positions, fan_all(vertices.ravel(), counts), normals, uv)
 
 
 def _corner(word: str, sizes: list[int]) -> list[int]:

@@ -3,23 +3,21 @@
 The file is in metres, X right, Y up, Z towards who looks; its cameras and lights look along -Z.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pcii.base.errors import InputError
 from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
+from simgen.importing.foreign_scene import UPRIGHT, ForeignScene, Part
 from simgen.importing.gltf_document import Node, Primitive, PunctualLight
 from simgen.importing.gltf_file import GltfFile, read_gltf
 from simgen.importing.gltf_materials import Surface, light_values
 from simgen.spec.scene import MOST_OBJECTS
 
-UPRIGHT = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From X right, Y up, Z towards who looks, as models stand, to X right, Y down, Z forward; and back."""
 MIN_EDGE_DEG = 0.1
 """A spot's light falls off within this angle at least."""
 MIN_SIZE, MAX_SIZE = 1e-9, 1e9
@@ -37,21 +35,7 @@ MAY_BE_IN_WATTS = (
 )
 
 
-class Part(NamedTuple):
-    """One object: triangles in their own axes, and a matrix (4, 4) from these to the axes of the file.
-
-    Parts with the same triangles share a file, which is called by the `stem` of the first. The material is as
-    in a scene.toml.
-    """
-
-    name: str
-    matrix: np.ndarray
-    triangles: Triangles
-    stem: str
-    material: dict[str, Any]
-
-
-class GltfScene:
+class GltfScene(ForeignScene):
     """All that is taken from a .gltf or .glb file.
 
     Matrices are (4, 4) float64, of columns (x, y, z, 1), from own axes to those of the file; an emission of 1
@@ -60,13 +44,9 @@ class GltfScene:
     """
 
     def __init__(self, path: Path, unit_mm: float, cd_m2_per_emission: float) -> None:
-        self.gltf, self.unit_mm = read_gltf(path), unit_mm
-        self.parts: list[Part] = []
-        self.lamps: list[tuple[np.ndarray, dict[str, Any]]] = []
-        """Lights that stand at the origin of their axes and shine along +Z: matrix, and values as in a
-        scene.toml but for position, target and direction."""
-        self.cameras: dict[str, tuple[np.ndarray, float | None]] = {}
-        """By name: matrix from axes X right, Y down, Z forward, and horizontal angle of view in degrees."""
+        super().__init__(path, unit_mm)
+        self.gltf = read_gltf(path)
+        self.left_out, self.images = self.gltf.left_out, self.gltf.images
         self._surface = cache(partial(Surface, self.gltf, cd_m2_per_emission))
         self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
         self._triangles = 0
@@ -74,56 +54,7 @@ class GltfScene:
         for index in self._places:
             self._add_node(index)
         if cd_m2_per_emission == 1 and self.lamps and any("emission" in part.material for part in self.parts):
-            self.gltf.lose(MAY_BE_IN_WATTS)
-
-    def bounds(self, matrix: np.ndarray) -> np.ndarray:
-        """The bounding box (2, 3) of all parts, smallest and largest, in axes to which a matrix leads."""
-        ends = []
-        for part in self.parts:
-            to_axes = matrix @ part.matrix
-            points = part.triangles.positions.astype(np.float64) @ to_axes[:3, :3].T + to_axes[:3, 3]
-            ends += [points.min(axis=0), points.max(axis=0)]
-        return np.array([np.min(ends, axis=0), np.max(ends, axis=0)])
-
-    def placement(
-        self, camera: str | None, place_at_mm: Sequence[float] | None, fit_mm: float | None
-    ) -> tuple[np.ndarray, str | None]:
-        """The matrix from the file's axes to the world's, in mm, and the camera that stands at its origin.
-
-        A camera of the file becomes the virtual centre, or the middle of the scene's bounding box comes to
-        `place_at_mm`, upright. `fit_mm` makes the longest side of that box so long. Raises `InputError` for a
-        scene without a surface, and unless one camera or a place is chosen.
-        """
-        if not self.parts:
-            reasons = "".join(f"; not represented: {what}" for what in self.gltf.left_out)
-            raise InputError(f"{self.gltf.path}: there is no surface in it{reasons}")
-        box = self.bounds(UPRIGHT)
-        scale = self.unit_mm if fit_mm is None else fit_mm / float(np.ptp(box, axis=0).max())
-        to_world = np.eye(4)
-        if place_at_mm is not None:
-            to_world[:3, :3] = scale * UPRIGHT[:3, :3]
-            to_world[:3, 3] = np.array(place_at_mm) - scale * box.mean(axis=0)
-            return to_world, None
-        if camera is None and len(self.cameras) == 1:
-            (camera,) = self.cameras
-        if camera not in self.cameras:
-            if self.cameras:
-                raise InputError(
-                    f"--camera: {self.gltf.path} has the cameras {', '.join(self.cameras)}; choose one"
-                )
-            x, y, z = scale * np.ptp(box, axis=0)
-            raise InputError(
-                f"--place-at-mm: {self.gltf.path} has no camera; say where the middle of its {x:.4g} x "
-                f"{y:.4g} x {z:.4g} mm stands, such as --place-at-mm 0 0 {round(2 * max(x, y) + z / 2, -1):g}"
-            )
-        # The camera's axes may also be scaled: Z forward is kept, then Y down.
-        matrix = self.cameras[camera][0]
-        forward = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        right = np.cross(matrix[:3, 1], forward)
-        right /= np.linalg.norm(right)
-        to_world[:3, :3] = scale * np.stack([right, np.cross(forward, right), forward])
-        to_world[:3, 3] = -to_world[:3, :3] @ matrix[:3, 3]
-        return to_world, camera
+            self.lose(MAY_BE_IN_WATTS)
 
     def _add_node(self, index: int) -> None:
         """The mesh, camera and light of a node."""
@@ -134,7 +65,7 @@ class GltfScene:
             for ending, copy in copies.items():
                 self._add_mesh(node, node.mesh, matrix @ copy, index, ending)
         if (node.camera is not None or node.light is not None) and not _can_stand(matrix):
-            self.gltf.lose(f"nodes[{index}], {NOWHERE}")
+            self.lose(f"nodes[{index}], {NOWHERE}")
             return
         if node.camera is not None:
             camera = self.gltf.item(document.cameras, node.camera, "cameras")
@@ -168,7 +99,7 @@ class GltfScene:
             matrix = np.eye(4)
         name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
         if not _can_stand(matrix):
-            self.gltf.lose(f"'{name}', {NOWHERE}")
+            self.lose(f"'{name}', {NOWHERE}")
             return
         for part, primitive in enumerate(mesh.primitives):
             key = number, part, node.skin
@@ -195,7 +126,7 @@ class GltfScene:
     ) -> tuple[Triangles, dict[str, Any]] | None:
         """Triangles and material of a primitive, None if there is no surface."""
         if primitive.mode < TRIANGLES:
-            self.gltf.lose("points and lines, which have no surface")
+            self.lose("points and lines, which have no surface")
             return None
         surface = self._surface(primitive.material, True)
         if f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:

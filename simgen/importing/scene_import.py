@@ -15,7 +15,9 @@ from pcii.exchange.export_pictures import write_png
 from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
-from simgen.importing.gltf_scene import GltfScene, Part
+from simgen.importing.foreign_scene import ForeignScene, Part
+from simgen.importing.gltf_scene import GltfScene
+from simgen.importing.mesh_scene import MESH_KINDS, MeshScene
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_reference import reference_to
 from simgen.spec.mitsuba_file import MitsubaFile, MitsubaXml
@@ -75,18 +77,20 @@ def import_scene(
     out: str | Path,
     *,
     camera: str | None = None,
-    unit: Unit = "m",
+    unit: Unit | None = None,
+    up: Literal["y", "z"] = "y",
     place_at_mm: Sequence[float] | None = None,
     fit_mm: float | None = None,
     emission_unit: EmissionUnit = "nit",
     unscored: Sequence[str] = (),
 ) -> ImportedScene:
-    """Make the folder `out` of a glTF file (.glb, .gltf) or a Mitsuba scene (.xml).
+    """Make the folder `out` of glTF (.glb, .gltf), a mesh (.obj, .ply, .stl) or a Mitsuba scene (.xml).
 
-    A glTF file is translated into an ordinary scene. A Mitsuba scene is copied, with all files that it names,
-    beside a scene.toml that refers to it. A camera of the file, `camera` if there are several, becomes the
-    virtual centre; or the middle of the scene comes to `place_at_mm`. `unit` is the file's; `fit_mm` makes
-    its longest side so long.
+    A glTF file is translated into an ordinary scene, and so is a mesh, each group of an OBJ file and each
+    solid of an STL file as an object. A Mitsuba scene is copied, with all files that it names, beside a
+    scene.toml that refers to it. A camera of the file, `camera` if there are several, becomes the virtual
+    centre; or the middle of the scene comes to `place_at_mm`. `unit` is the file's, metres unless it is a
+    mesh, and `up` the axis of a mesh that is up; `fit_mm` makes the longest side so long.
     `emission_unit` is that of the emission of a glTF file's materials: nit, which are cd/m^2, or watt, which
     are W/(sr m^2) and become 683 cd/m^2 each, as lights do that Blender exports in its mode Standard.
     `unscored` are names of objects that count in no score, such as a floor. Raises `pcii.InputError` for a
@@ -94,11 +98,25 @@ def import_scene(
     """
     path, folder = Path(file), Path(out)
     suffix = path.suffix.lower()
-    if suffix not in (".glb", ".gltf", ".xml"):
-        raise InputError(f"{path}: expected a glTF file (.glb or .gltf) or a Mitsuba scene (.xml)")
+    is_mesh = suffix in MESH_KINDS
+    if suffix not in (".glb", ".gltf", ".xml", *MESH_KINDS):
+        raise InputError(
+            f"{path}: expected a glTF file (.glb or .gltf), a mesh (.obj, .ply or .stl) or a Mitsuba scene "
+            "(.xml)"
+        )
+    if is_mesh and unit is None and fit_mm is None:
+        raise InputError(
+            f"--unit: {path} has no unit of length; say --unit mm, cm, m, in or ft, or how long its longest "
+            "side is, --fit-mm"
+        )
+    if up != "y" and not is_mesh:
+        raise InputError("--up: is for meshes; of glTF files and Mitsuba scenes Y is up")
+    unit = unit or "m"
     if unit not in MM_PER_UNIT:
         raise InputError(f"unit: expected one of {', '.join(MM_PER_UNIT)}, got {unit!r}")
-    if emission_unit not in CD_M2_PER_EMISSION or (suffix == ".xml" and emission_unit != "nit"):
+    if emission_unit not in CD_M2_PER_EMISSION or (
+        suffix not in (".glb", ".gltf") and emission_unit != "nit"
+    ):
         raise InputError(f"emission_unit: expected nit, or watt for a glTF file, got {emission_unit!r}")
     if folder.exists():
         raise InputError(f"{folder}: is there already; choose another folder or remove it")
@@ -108,8 +126,12 @@ def import_scene(
     reference = validate(MitsubaFile, {k: v for k, v in values.items() if v is not None}, "import-scene")
     if suffix == ".xml":
         return _copy_reference(path, reference, folder)
-    scene = GltfScene(path, reference.unit_mm, CD_M2_PER_EMISSION[emission_unit])
-    return _write_scene(scene, *scene.placement(camera, reference.place_at_mm, fit_mm), unscored, folder)
+    if is_mesh:
+        scene: ForeignScene = MeshScene(path, reference.unit_mm, is_z_up=up == "z")
+    else:
+        scene = GltfScene(path, reference.unit_mm, CD_M2_PER_EMISSION[emission_unit])
+    to_world, camera = scene.placement(camera, reference.place_at_mm, fit_mm)
+    return _write_scene(scene, to_world, camera, unscored, folder)
 
 
 def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedScene:
@@ -133,12 +155,12 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
 
 
 def _write_scene(
-    scene: GltfScene, to_world: np.ndarray, camera: str | None, unscored: Sequence[str], out: Path
+    scene: ForeignScene, to_world: np.ndarray, camera: str | None, unscored: Sequence[str], out: Path
 ) -> ImportedScene:
     """Write the folder of a translated scene."""
-    gltf, meshes = scene.gltf, Meshes()
+    meshes = Meshes()
     names = names_of_objects([part.name for part in scene.parts])
-    check_unscored(unscored, names, str(gltf.path))
+    check_unscored(unscored, names, str(scene.path))
     objects = [
         _object(part, name, to_world, meshes) | {"scored": name not in unscored}
         for part, name in zip(scene.parts, names, strict=True)
@@ -147,25 +169,25 @@ def _write_scene(
     lights = [_light(to_world @ matrix, values, growth) for matrix, values in scene.lamps]
     if not lights and not any("emission" in part.material for part in scene.parts):
         lights.append({"type": "uniform", "luminance_cd_m2": 100.0, "visible": False})
-        gltf.lose("the file has no light: the scene is lit evenly from all around")
-    values = {"title": shorten(gltf.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
-    valid = validate(Scene, values, f"{gltf.path}: the scene made of it")
-    comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in gltf.left_out)]
+        scene.lose("the file has no light: the scene is lit evenly from all around")
+    values = {"title": shorten(scene.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
+    valid = validate(Scene, values, f"{scene.path}: the scene made of it")
+    comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in scene.left_out)]
     text = toml_text(valid, comments).encode()
     if len(text) > LARGEST_TOML_BYTES:
-        raise InputError(f"{gltf.path}: its scene.toml would have more than {LARGEST_TOML_BYTES} bytes")
+        raise InputError(f"{scene.path}: its scene.toml would have more than {LARGEST_TOML_BYTES} bytes")
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
         (new / "scene.toml").write_bytes(text)
         for name, mesh in meshes.values():
             (new / name).write_bytes(ply_bytes(mesh))
-        for name, pixels in gltf.images.items():
+        for name, pixels in scene.images.items():
             write_png(new / name, pixels)
     triangles = sum(len(part.triangles.faces) for part in scene.parts)
     size_mm = tuple(np.ptp(scene.bounds(to_world), axis=0).tolist())
     angle_deg = None if camera is None else scene.cameras[camera][1]
     return ImportedScene(
-        out, tuple(gltf.left_out), (), len(objects), triangles, len(lights), size_mm, camera, angle_deg
+        out, tuple(scene.left_out), (), len(objects), triangles, len(lights), size_mm, camera, angle_deg
     )
 
 

@@ -144,6 +144,6 @@ def test_nothing_of_the_users_is_overwritten(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="out: is there already"):
         import_scene(tmp_path / "a.glb", tmp_path / "out", **AT_600)
     with pytest.raises(InputError, match=r"expected a glTF file \(.glb or .gltf\)"):
-        import_scene(tmp_path / "a.obj", tmp_path / "other")
+        import_scene(tmp_path / "a.fbx", tmp_path / "other")
     with pytest.raises(InputError, match="there is no such file"):
         import_scene(tmp_path / "b.glb", tmp_path / "other")
