@@ -53,10 +53,6 @@ END_TOLERANCE_PX = 0.5
 UNSUPPORTED_CONFIDENCE = 0.5
 """Of the probability of a depth that the photons around do not support. If it is larger, plain light around a
 thing is too sure; if it is smaller, walls with little detail are less sure than they are right."""
-CERTAINTY, CONFIDENCE_SHIFT = 1.5, 0.5
-"""Slope and shift of the log-odds that a depth is within a plane: where the posterior says .4 or more it is
-right more often (docs/experiments/depth.md). If they are larger, scenes in little light are surer than right;
-if smaller, those in much light are less sure than right."""
 NO_DEPTHS = np.zeros(0)
 
 
@@ -307,18 +303,12 @@ def _is_between(total_px: np.ndarray, ends_px: np.ndarray) -> np.ndarray:
 
 
 def depth_map_of(posterior: DepthPosterior, z_range_mm: tuple[float, float]) -> DepthMap:
-    """Depth and confidence of pixels, where the posterior has an answer within the range.
-
-    The confidence is the posterior's, calibrated by a logistic curve (Platt 1999).
-    """
-    from scipy.special import expit, logit
-
+    """Depth and confidence of pixels, where the posterior has an answer within the range."""
     grid = posterior.planes.grid
     _, confidence, total_px = posterior.most_probable()
     ends_px = total_disparity_px(grid, np.array(z_range_mm))
     is_answered = posterior.is_detected & _is_between(total_px, ends_px)
     depth_mm = depth_of_total_disparity_mm(grid, np.clip(total_px, *ends_px[::-1]))
-    confidence = expit(CERTAINTY * logit(confidence.clip(0, 1)) + CONFIDENCE_SHIFT)
     confidence = np.where(posterior.is_supported, confidence, UNSUPPORTED_CONFIDENCE * confidence)
     maps = np.where(is_answered, depth_mm, np.nan), np.where(is_answered, confidence, 0.0)
     on_film = (on_pixels(part, posterior.block_px, grid.shape_HW) for part in maps)

@@ -75,6 +75,8 @@ class MeshScene(ForeignScene):
                     name = " ".join(words)
                 elif keyword == "Kd" and len(words) == 3:
                     materials[name] = {"reflectance": [min(max(float(word), 0.0), 1.0) for word in words]}
+                elif keyword == "Kd":
+                    self.lose("colours of materials (Kd) that are no three numbers")
                 elif keyword.startswith("map_"):
                     self.lose(f"pictures of materials ({keyword})")
                 elif keyword in ("Ke", "Tf", "d", "Tr") and {*words} - {"0", "0.0", "1", "1.0"}:
