@@ -28,7 +28,7 @@ def open_array(path: Path, key: str | None = None) -> np.ndarray:
 
     `key` names one of several; it is not needed if one alone has at least three axes. Axes are in the order
     that the writing program shows: of .mat files that of MATLAB. Raises `InputError`, naming the file, for
-    what is no array of real numbers, for a key that it lacks, and for one that memory does not hold.
+    what is no array, for a key that it lacks, and for one that memory does not hold.
     """
     name_other_file(path)
     try:
@@ -56,10 +56,9 @@ def open_array(path: Path, key: str | None = None) -> np.ndarray:
         raise InputError(f"{path}: its array is larger than the memory; save it as .npy") from None
     except Exception:  # damaged content raises various exceptions
         raise InputError(
-            f"{path}: not an array of numbers in a .npy, .npz, .mat or HDF5 file, or a damaged one"
+            f"{path}: not an array of numbers in a .npy file, as numpy.save writes it, nor in a .npz, .mat "
+            "or HDF5 file"
         ) from None
-    if numbers.dtype.kind not in "biuf":
-        raise InputError(f"{path}: holds {numbers.dtype}; expected real numbers")
     return numbers
 
 

@@ -53,6 +53,8 @@ class DepthFile:
             raise InputError(
                 f"--depth: {path} is {numbers.shape}, and views are {grid.shape_HW}, rows x columns"
             )
+        if numbers.dtype.kind not in "iuf":
+            raise InputError(f"--depth: {path} holds {numbers.dtype}; expected real numbers")
         is_unknown = np.isnan(numbers) | (numbers == 0)
         if numbers.dtype.kind in "iu":
             is_unknown |= numbers == np.iinfo(numbers.dtype).max

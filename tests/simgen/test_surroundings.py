@@ -159,6 +159,7 @@ def test_what_is_not_visible_lights_things_before_darkness(kind: str, tmp_path: 
     assert (dark <= lit).all()
     gain = (5000 if SCALAR else 40_000) / dark.sum() * 3
     photons, _ = thinned(hidden, film(), DEPTH, gain)
+    assert photons.object_id is not None
     assert (photons.object_id > 0).all()
     expected = seen(hidden, film(), 512)
     assert abs(surprise(photons, expected, film(), gain)) < 5
