@@ -83,6 +83,7 @@ def main(folder: str = "out/training", seconds: float = 2.0) -> None:
     options: dict[str, Any] = {"fields": ("sections", "evidence", "truth"), "photons": (100, 10_000)}
     training = pcii.examples(folder, split="train", crop_px=(128, 128), poses=True, **options)
     unseen = pcii.examples(folder, split="test", seed=0, **options)
+    print(f"{len(training)} datasets to learn from, {len(unseen)} that are not seen")
     shares = right_shares(train(training, seconds), unseen)
     print("right planes: {:.3f} by the weights, {:.3f} by evidence alone".format(*shares))
 
