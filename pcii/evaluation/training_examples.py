@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from pcii.types.truth import Truth
 
 Field = Literal["counts", "sections", "evidence", "truth"]
 Example = dict[str, np.ndarray]
-SPLITS: tuple[Split, ...] = ("train", "validation", "test")
+SPLITS: tuple[Split, ...] = get_args(Split)
 CROP_STEP_PX = 4
 """Parts begin at multiples of this: of Bayer patterns, and of the blocks of evidence."""
 
@@ -74,7 +74,7 @@ def examples(
 
 @dataclass(eq=False)
 class Examples(Sequence[Example]):
-    """Examples of datasets; see `examples`. Each dataset is opened when one is asked for."""
+    """What `examples` makes of datasets. A dataset of a collection is opened each time it is asked for."""
 
     datasets: Sequence[Dataset]
     fields: tuple[Field, ...]
@@ -86,7 +86,7 @@ class Examples(Sequence[Example]):
     epoch: int = 0
 
     def __post_init__(self) -> None:
-        known = Field.__args__
+        known = get_args(Field)
         if not self.fields or not {*self.fields} <= {*known}:
             raise InputError(f"fields: expected some of {', '.join(known)}, got {self.fields}")
         if isinstance(self.planes, int) and self.planes < 2:
@@ -104,12 +104,12 @@ class Examples(Sequence[Example]):
         entropy = None if self.seed is None else (self.seed, self.epoch, number % len(self))
         rng = np.random.default_rng(entropy)
         pose = _Pose.drawn(dataset.grid, self.crop_px, self.poses, rng)
+        planes = self._planes_of(dataset, pose.of_grid(dataset.grid))
         example: Example = {}
         if {*self.fields} - {"truth"}:
             counts = pose.of_counts(dataset.counts)
             if self.photons is not None:
                 counts = _thinned(dataset, counts, self.photons, rng)
-            planes = self._planes_of(dataset, counts.grid)
             if "counts" in self.fields:
                 example["counts"] = counts.dense.astype(np.int32)
             if "sections" in self.fields:
@@ -120,8 +120,7 @@ class Examples(Sequence[Example]):
         if "truth" in self.fields:
             if dataset.truth is None:
                 raise InputError(f"{dataset.path}: has no truth, which the field 'truth' is made of")
-            grid = pose.of_grid(dataset.grid)
-            example |= _truth_fields(pose.of_truth(dataset.truth), self._planes_of(dataset, grid))
+            example |= _truth_fields(pose.of_truth(dataset.truth), planes)
         return example
 
     def _planes_of(self, dataset: Dataset, grid: CameraGrid) -> FocalPlanes:
@@ -135,8 +134,8 @@ class Examples(Sequence[Example]):
 class _Pose:
     """A part of a film, mirrored along `flips` (0 rows, 1 columns), then maybe transposed."""
 
-    rows: slice
-    cols: slice
+    corner: tuple[int, int]
+    size: tuple[int, int]
     flips: tuple[int, ...]
     is_transposed: bool
 
@@ -147,24 +146,22 @@ class _Pose:
         height, width = crop_px or grid.shape_HW
         if height > grid.height or width > grid.width:
             raise InputError(f"crop_px: {height} x {width} is larger than {grid.height} x {grid.width} px")
-        top, left = (
-            CROP_STEP_PX * int(rng.integers((whole - part) // CROP_STEP_PX + 1))
-            for whole, part in ((grid.height, height), (grid.width, width))
-        )
+        steps = (grid.height - height) // CROP_STEP_PX, (grid.width - width) // CROP_STEP_PX
+        top, left = (CROP_STEP_PX * int(rng.integers(most + 1)) for most in steps)
         draws = rng.random(3) < 0.5 if poses else (False, False, False)
         flips = tuple(axis for axis in range(2) if draws[axis])
         is_transposed = bool(draws[2]) and height == width
-        return cls(slice(top, top + height), slice(left, left + width), flips, is_transposed)
+        return cls((top, left), (height, width), flips, is_transposed)
 
     def of_map(self, values: np.ndarray) -> np.ndarray:
         """The part of a map (H, W, ...)."""
-        part = np.flip(values[self.rows, self.cols], self.flips)
+        (top, left), (height, width) = self.corner, self.size
+        part = np.flip(values[top : top + height, left : left + width], self.flips)
         return np.ascontiguousarray(part.swapaxes(0, 1) if self.is_transposed else part)
 
     def of_grid(self, grid: CameraGrid) -> CameraGrid:
         """The cameras of the part. Their axes meet it anywhere, on which no disparity depends."""
-        size = {"height": self.rows.stop - self.rows.start, "width": self.cols.stop - self.cols.start}
-        grid = replace(grid, **size)
+        grid = replace(grid, height=self.size[0], width=self.size[1])
         if not self.is_transposed:
             return grid
         turned = {"rows": grid.cols, "cols": grid.rows, "height": grid.width, "width": grid.height}
@@ -173,14 +170,14 @@ class _Pose:
     def of_counts(self, counts: PhotonCounts) -> PhotonCounts:
         """The photons of the part, in cameras that are mirrored and transposed with it."""
         grid, events = counts.grid, counts.events
-        here = (events.i >= self.rows.start) & (events.i < self.rows.stop)
-        here &= (events.j >= self.cols.start) & (events.j < self.cols.stop)
-        k, l, n = events.k[here], events.l[here], events.n[here]
-        i, j = events.i[here] - self.rows.start, events.j[here] - self.cols.start
+        (top, left), (height, width) = self.corner, self.size
+        i, j = events.i - top, events.j - left
+        here = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+        k, l, i, j, n = (column[here] for column in (events.k, events.l, i, j, events.n))
         if 0 in self.flips:
-            k, i = grid.rows - 1 - k, self.rows.stop - self.rows.start - 1 - i
+            k, i = grid.rows - 1 - k, height - 1 - i
         if 1 in self.flips:
-            l, j = grid.cols - 1 - l, self.cols.stop - self.cols.start - 1 - j
+            l, j = grid.cols - 1 - l, width - 1 - j
         if self.is_transposed:
             k, l, i, j = l, k, j, i
         cfa = counts.cfa
@@ -223,19 +220,14 @@ def _thinned(
 
 
 def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
-    at_px = total_disparity_px(planes.grid, planes.z_mm)
-    order = np.argsort(at_px)
-    with np.errstate(invalid="ignore"):
-        own_px = total_disparity_px(planes.grid, truth.z_mm)
-    after = np.searchsorted(at_px[order], own_px).clip(1, len(planes) - 1)
-    near = own_px - at_px[order][after - 1] < at_px[order][after] - own_px
-    plane = order[after - near]
-    reach_px = np.diff(at_px[order]).max() / 2
-    is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (np.abs(at_px[plane] - own_px) <= reach_px)
+    focus = TrueFocus(planes, truth)
+    plane, off_px = focus.blur_px.argmin(axis=0), 2 * focus.blur_px.min(axis=0)
+    reach_px = np.diff(np.sort(total_disparity_px(planes.grid, planes.z_mm))).max() / 2
+    is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (off_px <= reach_px)
     return {
         "z_mm": truth.z_mm.astype(np.float32),
         "object_id": truth.object_id.astype(np.int16),
-        "in_focus": TrueFocus(planes, truth).by_pixel,
+        "in_focus": focus.by_pixel,
         "plane": np.where(is_known, plane, -1).astype(np.int64),
     }
 
@@ -256,19 +248,19 @@ def _of_split(
         )
     if isinstance(data, Collection):
         keys = [{"scene": (row["scene"], row["scene_number"]), "seed": row["seed"]} for row in data.rows]
-        own = [row["split"] for row in data.rows]
+        splits = [row["split"] for row in data.rows]
     else:
         recipes = [dataset.manifest.recipe for dataset in data]
         keys = [{"scene": (r.get("scene"), r.get("scene_number")), "seed": r.get("seed")} for r in recipes]
-        own = [None] * len(keys)
+        splits = [None] * len(keys)
     if shares is not None:
         if min(shares) < 0 or not math.isclose(sum(shares), 1, abs_tol=1e-6):
             raise InputError(f"shares: expected three shares that sum to 1, got {shares}")
         ends = np.cumsum(shares)
-        own = [SPLITS[min(int(np.searchsorted(ends, _hashed(key[by]), "right")), 2)] for key in keys]
-    elif None in own:
+        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key[by]), "right")), 2)] for key in keys]
+    elif None in splits:
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
-    mask = [one == split for one in own]
+    mask = [each == split for each in splits]
     if not any(mask):
         raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by='seed'")
     if isinstance(data, Collection):

@@ -17,7 +17,7 @@ HDF5_START = b"\x89HDF\r\n\x1a\n"
 MATLAB_HEAD_BYTES = 512
 """What MATLAB writes before the HDF5 content of a .mat file of version 7.3."""
 LEAST_AXES = 3
-"""An array of views has at least as many; of one alone in its file no key is asked."""
+"""Views have at least as many axes: the only such array of a file is read without a key."""
 MOST_NAMED = 6
 """Largest number of arrays that a sentence names."""
 FORMATS_EXTRA = 'pip install "photon-integral-imaging[formats]"'
@@ -36,16 +36,15 @@ def open_array(path: Path, key: str | None = None) -> np.ndarray:
             head = file.read(MATLAB_HEAD_BYTES + len(HDF5_START))
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
-    is_matlab = head.startswith(b"MATLAB 5.0") or (path.suffix.lower() == ".mat" and HDF5_START not in head)
     try:
         if HDF5_START in (head[: len(HDF5_START)], head[MATLAB_HEAD_BYTES:]):
             numbers = _read_hdf5(path, key, is_turned=head.startswith(b"MATLAB"))
-        elif is_matlab:
+        elif head.startswith(b"MATLAB 5.0") or path.suffix.lower() == ".mat":
             numbers = _read_matlab(path, key)
         elif zipfile.is_zipfile(path):
             with np.load(path, allow_pickle=False) as archive:
-                shapes = {name: archive[name].shape for name in archive.files}
-                numbers = archive[_chosen(path, key, shapes)]
+                arrays = dict(archive)
+            numbers = arrays[_chosen(path, key, {name: array.shape for name, array in arrays.items()})]
         elif key is not None:
             raise InputError(f"{path}: --key is for .npz, .mat and HDF5 files, and this has one array")
         else:

@@ -14,9 +14,8 @@ from pcii.types.truth import Truth
 
 DEPTH_PICTURES = ("PNG", "TIFF", "EXR", "PFM")
 """Kinds of pictures that keep depth."""
-DEPTH_CHANNELS = ("Z", "V", "Y", "R")
-"""Ends of the names of channels that hold depth in EXR files of several, as renderers and Blender write them,
-the surest first."""
+DEPTH_CHANNELS = ("Z", "V", "Y")
+"""How the names of channels of depth end in EXR files of several, the surest first: V is of Blender."""
 NEAREST_MM, FARTHEST_MM = 0.1, 1e8
 """Depths that can be: where a ray meets nothing renderers write 1e10."""
 UNKNOWN = 1
@@ -91,8 +90,9 @@ def _numbers_in(path: Path) -> np.ndarray:
     kind = kind_of(path) if path.is_file() else None
     if kind is None:
         return np.squeeze(open_array(path))
-    if kind == "EXR":
-        return _depth_channel(path)
+    channel = _depth_channel(path) if kind == "EXR" else None
+    if channel is not None:
+        return channel
     picture = picture_of(path, DEPTH_PICTURES)
     pixels = next(decode(picture))
     if picture.pages > 1 or (pixels != pixels[..., :1]).any():
@@ -100,8 +100,8 @@ def _numbers_in(path: Path) -> np.ndarray:
     return pixels[..., 0]
 
 
-def _depth_channel(path: Path) -> np.ndarray:
-    """The channel of depth of an EXR file, which renderers name in several ways."""
+def _depth_channel(path: Path) -> np.ndarray | None:
+    """The channel of depth of an EXR file, which renderers name in several ways; None of a picture."""
     import OpenEXR
 
     try:
@@ -117,7 +117,7 @@ def _depth_channel(path: Path) -> np.ndarray:
         for name, pixels in channels.items():
             if name.split(".")[-1].upper() == end:
                 return pixels
-    raise InputError(f"--depth: {path} has the channels {', '.join(channels)[:60]}; expected Z, or one alone")
+    return None
 
 
 def _ray_lengths(grid: CameraGrid) -> np.ndarray:

@@ -23,6 +23,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
+from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
 from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
@@ -102,7 +103,8 @@ def import_hci(
             raise InputError(f"{picture.path}: is {picture.layout()}, and the views {height} x {width} px")
         numbers = next(decode(picture))[..., 0].astype(np.float64)
         z_mm = 1000 * numbers if maps[0] == DEPTH else depth_mm(numbers)
-        if not (((z_mm >= 0.1) & (z_mm <= 1e8)) | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
+        is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
+        if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
             raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
         truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {})
         tell(f"with the true depth of the virtual centre, {maps[0]}")

@@ -16,7 +16,7 @@ MIN_VOXEL_COUNTS = 0.1
 MAX_OTHER_SHARE = 0.5
 """Share of the photons that may come from no object, and of the counts that no photon made."""
 LEAST_NAMED_SHARE = 0.0005
-"""What would be told as 0.0 % is not."""
+"""Smaller shares are not named: they would be printed as 0.0 %."""
 USUAL_SHARE = 0.25
 """Share of the candidates that is kept where a photon costs `PHOTON_COST`; where fewer are, it costs more."""
 

@@ -1,6 +1,8 @@
 """Files of meshes alone as foreign scenes: OBJ by groups and materials, STL by solids, PLY."""
 
 import re
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ class MeshScene(ForeignScene):
     def __init__(self, path: Path, unit_mm: float, *, is_z_up: bool) -> None:
         super().__init__(path, unit_mm)
         try:
-            for name, (mesh, material) in self._read().items():
+            for name, mesh, material in self._read():
                 self.parts.append(Part(name, Y_UP if is_z_up else np.eye(4), mesh, name, material))
         except ValueError as fault:
             raise InputError(f"{path}: this file {shorten(str(fault))}") from None
@@ -41,22 +43,22 @@ class MeshScene(ForeignScene):
         if len(self.parts) > MOST_OBJECTS:
             raise InputError(f"{path}: has more than {MOST_OBJECTS} groups; join those of one material")
 
-    def _read(self) -> dict[str, tuple[Triangles, dict[str, Any]]]:
-        """Meshes and materials by the names of objects."""
+    def _read(self) -> Iterator[tuple[str, Triangles, dict[str, Any]]]:
+        """Names, meshes and materials of objects; several may have one name."""
         kind, stem = self.path.suffix.lower(), self.path.stem
         if kind == ".stl":
-            return {name: (mesh, GREY) for name, mesh in _stl_solids(self.path.read_bytes(), stem).items()}
-        if kind == ".ply":
-            return {stem: (read_mesh(self.path), GREY)}
-        libraries, parts = obj_parts(self.path.read_bytes())
-        materials = self._materials(libraries)
-        per_group = [group for group, _ in parts]
-        found: dict[str, tuple[Triangles, dict[str, Any]]] = {}
-        for (group, material), mesh in parts.items():
-            name = group or material or stem
-            name = f"{name}-{material}" if group and per_group.count(group) > 1 and material else name
-            found[name] = mesh, materials.get(material, GREY)
-        return found
+            yield from ((name, mesh, GREY) for name, mesh in _stl_solids(self.path.read_bytes(), stem))
+        elif kind == ".ply":
+            yield stem, read_mesh(self.path), GREY
+        else:
+            libraries, parts = obj_parts(self.path.read_bytes())
+            materials = self._materials(libraries)
+            materials_of = Counter(group for group, _ in parts)
+            for (group, material), mesh in parts.items():
+                name = group or material or stem
+                if group and material and materials_of[group] > 1:
+                    name = f"{group}-{material}"
+                yield name, mesh, materials.get(material, GREY)
 
     def _materials(self, libraries: list[str]) -> dict[str, dict[str, Any]]:
         """Diffuse colours (Kd) by material of the MTL files of an OBJ file; what else they have is named."""
@@ -84,22 +86,19 @@ class MeshScene(ForeignScene):
         return materials
 
 
-def _stl_solids(data: bytes, stem: str) -> dict[str, Triangles]:
-    """Meshes of an STL file by the names of its solids; raises `ValueError` with the end of a sentence."""
+def _stl_solids(data: bytes, stem: str) -> Iterator[tuple[str, Triangles]]:
+    """Names and meshes of the solids of an STL file; raises `ValueError` with the end of a sentence."""
     count = int.from_bytes(data[STL_HEAD_BYTES - 4 : STL_HEAD_BYTES], "little")
     if len(data) == STL_HEAD_BYTES + count * STL_FACET.itemsize:
-        corners = np.frombuffer(data, STL_FACET, count, STL_HEAD_BYTES)["corners"]
-        return {stem: _joined(corners.reshape(-1, 3))}
+        yield stem, _joined(np.frombuffer(data, STL_FACET, count, STL_HEAD_BYTES)["corners"].reshape(-1, 3))
+        return
     text = data.decode("latin-1")
     if not text.lstrip().startswith("solid"):
         raise ValueError(f"is cut off or no STL file: {count} facets are {len(data)} bytes")
-    solids: dict[str, Triangles] = {}
-    for number, solid in enumerate(re.split(r"^\s*solid\b", text, flags=re.MULTILINE)[1:], start=1):
+    for solid in re.split(r"^\s*solid\b", text, flags=re.MULTILINE)[1:]:
         name, _, body = solid.partition("\n")
         points = re.findall(r"vertex\s+(\S+)\s+(\S+)\s+(\S+)", body)
-        own = name.strip() or (stem if number == 1 else f"{stem}-{number}")
-        solids[own] = _joined(np.array(points, dtype=np.float64).reshape(-1, 3))
-    return solids
+        yield name.strip() or stem, _joined(np.array(points, dtype=np.float64).reshape(-1, 3))
 
 
 def _joined(corners: np.ndarray) -> Triangles:

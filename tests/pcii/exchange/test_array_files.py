@@ -145,3 +145,13 @@ def test_depths_that_cannot_be(tmp_path: Path, capsys: Any, z: Any, options: lis
         np.save(tmp_path / "z.npy", z)
         options = [*options, "--depth", str(tmp_path / "z.npy")]
     check_refused(tmp_path / "views.npy", tmp_path / "out", [*CAMERAS, *options], words, capsys)
+
+
+def test_a_picture_in_colours_is_no_map_of_depth(tmp_path: Path, capsys: Any) -> None:
+    np.save(tmp_path / "views.npy", VIEWS_KLHW)
+    planes = {
+        name: np.full((20, 24), value, np.float32) for name, value in zip("RGB", (1, 2, 3), strict=True)
+    }
+    OpenEXR.File({}, planes).write(str(tmp_path / "photo.exr"))
+    options = [*CAMERAS, "--depth", tmp_path / "photo.exr"]
+    check_refused(tmp_path / "views.npy", tmp_path / "out", options, "has colours or several pages", capsys)

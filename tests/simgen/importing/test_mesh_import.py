@@ -50,7 +50,7 @@ def write_ascii_stl(path: Path) -> None:
         )
         return f"solid {name}\n{loops}endsolid {name}\n"
 
-    path.write_text(solid("one", -2) + solid("two", 2))
+    path.write_text(solid("one", -2) + solid("two", 2) + solid("two", 6))
 
 
 def boxes_mm(scene: Scene, folder: Path) -> dict[str, list[float]]:
@@ -112,7 +112,7 @@ def test_solids_of_stl_files(tmp_path: Path) -> None:
     assert len(read_mesh(tmp_path / "box" / "box.ply").positions) == 8
     write_ascii_stl(tmp_path / "two.stl")
     import_scene(tmp_path / "two.stl", tmp_path / "two", unit="m", **AT_600)
-    assert [thing.name for thing in load_scene(str(tmp_path / "two")).objects] == ["one", "two"]
+    assert [thing.name for thing in load_scene(str(tmp_path / "two")).objects] == ["one", "two", "two-2"]
 
 
 def test_meshes_that_cannot_be_imported(tmp_path: Path) -> None:
