@@ -42,6 +42,7 @@ from pcii.store.folders import (
     entries,
     list_files,
     lists_part,
+    read_part,
     read_results,
     unlisted_files,
 )
@@ -183,7 +184,8 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
 
     def read(part: str, labels: Mapping[str, Any]) -> dict[str, np.ndarray]:
         names = [name for name in labels if lists_part(files, f"{part}/{name}")]
-        return {n: read_array(out, f"{part}/{n}", files, labels[n], sizes) for n in names}
+        contents = read_part(out, files, part)
+        return {n: read_array(out, f"{part}/{n}", contents, labels[n], sizes) for n in names}
 
     segmented: list[Segmented] = []
     sections: dict[bytes, Sections] = {}

@@ -22,7 +22,8 @@ def export(
     hci: the layout of the HCI 4D light field benchmark. nerfstudio: a PNG for each view and transforms.json
     with the poses of the cameras, as neural reconstruction reads them. photoncube: the binary frames of each
     view as packed bits, with poses. events: a NumPy archive of photons, cameras and truth. Each dataset of a
-    collection is written to a folder in the new one that has its name.
+    collection is written to a folder in the new one that has its name. webdataset: tar files of such
+    archives, of a collection as a whole, to stream while training.
 
     Examples of use:
 

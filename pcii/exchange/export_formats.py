@@ -7,13 +7,18 @@
 Bits of a photon cube are packed along the width, the first pixel in the highest bit, as numpy.packbits does;
 bits beyond the last pixel are 0. Blocks of a file without a set bit are not written: they are holes, which
 read as zeros and take no room on the disk.
+
+    train-000000.tar    of a collection: 000017.npz, the events of its dataset 17, and 000017.json, its row
+                        of the index; shards of a split, or "all", in an order that is drawn once for all
 """
 
+import io
 import json
+import tarfile
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -29,16 +34,18 @@ from pcii.exchange.export_pictures import (
     write_nerfstudio,
 )
 from pcii.exchange.hci_scenes import write_hci
-from pcii.store.collection import Collection, is_collection, open_collection
+from pcii.store.collection import COLUMNS, Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import check_free
 from pcii.types.photon_counts import FrameEvents
 from pcii.types.photon_limit import Light
 from pcii.types.truth import OPTIONAL_MAPS, Truth
 
-Format = Literal["hci", "nerfstudio", "photoncube", "events"]
+Format = Literal["hci", "nerfstudio", "photoncube", "events", "webdataset"]
 ARCHIVE = "events.npz"
 FRAMES = "frames.npy"
+SHARD_BYTES = 1 << 28
+"""A shard is full from here on: large enough to stream, small enough that several processes have some."""
 
 
 def export_dataset(
@@ -54,12 +61,13 @@ def export_dataset(
     Each dataset of a collection, or of a part of one, is written to a folder in `out` that has its name.
     `budget` is a nested photon budget, whose photons are written instead of all. `format` is "hci" (the
     layout of the HCI 4D light field benchmark), "nerfstudio" (pictures and their poses, transforms.json),
-    "photoncube" (binary frames as packed bits, and poses) or "events" (one NumPy archive); docs/exchange.md
-    describes them. The folder is there as a whole or not at all. Raises `InputError` for another format, a
-    folder that holds something or is part of the dataset, and a dataset that lacks what the format needs.
+    "photoncube" (binary frames as packed bits, and poses), "events" (one NumPy archive) or, of a collection,
+    "webdataset" (tar files of such archives); docs/exchange.md describes them. The folder is there as a whole
+    or not at all. Raises `InputError` for another format, a folder that holds something or is part of the
+    dataset, and a dataset that lacks what the format needs.
     """
-    if format not in WRITERS:
-        raise InputError(f"format: there is no {format!r}; use one of {', '.join(WRITERS)}")
+    if format not in get_args(Format):
+        raise InputError(f"format: there is no {format!r}; use one of {', '.join(get_args(Format))}")
     if isinstance(dataset, str | Path):
         dataset = open_collection(dataset) if is_collection(Path(dataset)) else open_dataset(dataset)
     folder = Path(out)
@@ -72,23 +80,34 @@ def export_dataset(
         raise InputError(f"{dataset.path}: the collection has no finished dataset to export")
     folder.parent.mkdir(parents=True, exist_ok=True)
 
-    def write(one: Dataset, place: Path) -> None:
-        WRITERS[format](one if budget is None else one.at_light(Light(budget)), place)
+    def in_light(one: Dataset) -> Dataset:
+        return one if budget is None else one.at_light(Light(budget))
 
     with named_in_errors(folder), new_folder_safely(folder) as temporary:
         if isinstance(dataset, Dataset):
-            write(dataset, temporary)
-            return folder
-        for number, one in enumerate(dataset, start=1):
-            place = temporary / one.path.name
-            place.mkdir()
-            write(one, place)
-            report("datasets", number, len(dataset))
+            if format == "webdataset":
+                raise InputError(
+                    f"{dataset.path}: webdataset is for a collection of datasets; events for one"
+                )
+            WRITERS[format](in_light(dataset), temporary)
+        elif format == "webdataset":
+            write_shards(dataset, temporary, in_light, report)
+        else:
+            for number, one in enumerate(dataset, start=1):
+                place = temporary / one.path.name
+                place.mkdir()
+                WRITERS[format](in_light(one), place)
+                report("datasets", number, len(dataset))
     return folder
 
 
 def write_events(dataset: Dataset, folder: Path) -> None:
-    """Write `events.npz`, whose arrays need no pickle.
+    """Write `events.npz`, the archive of `events_of`."""
+    (folder / ARCHIVE).write_bytes(events_of(dataset))
+
+
+def events_of(dataset: Dataset) -> bytes:
+    """Photons, cameras and truth as a NumPy archive, whose arrays need no pickle.
 
     `k`, `l`, `i`, `j`, `n` (events,); `frames`, `bits` and `frame` (photons,) of a camera that has frames, if
     they are known; each field of the `CameraGrid` by its name; `cfa`, "" for monochrome.
@@ -108,7 +127,34 @@ def write_events(dataset: Dataset, folder: Path) -> None:
     if dataset.truth is not None:
         values |= _truth_arrays(dataset.truth)
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
-    np.savez_compressed(folder / ARCHIVE, **arrays)
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays)
+    return content.getvalue()
+
+
+def write_shards(
+    collection: Collection, folder: Path, in_light: Callable[[Dataset], Dataset], report: Report
+) -> None:
+    """Write the tar files of a collection as WebDataset reads them, each split in shards of its own.
+
+    Datasets that follow each other are alike, so they are in an order drawn at random, the same each time.
+    """
+    of_split = dict[str, list[Path]]()
+    order = np.random.default_rng(0).permutation(len(collection))
+    for done, number in enumerate(order.tolist(), start=1):
+        row = collection.rows[number]
+        split = row["split"] or "all"
+        shards = of_split.setdefault(split, [])
+        if not shards or shards[-1].stat().st_size >= SHARD_BYTES:
+            shards.append(folder / f"{split}-{len(shards):06d}.tar")
+        described = {name: row[name] for name in (*COLUMNS, "values")}
+        parts = {"npz": events_of(in_light(collection[number])), "json": json_bytes(described)}
+        with tarfile.open(shards[-1], "a", format=tarfile.USTAR_FORMAT) as shard:
+            for suffix, content in parts.items():
+                member = tarfile.TarInfo(f"{number:06d}.{suffix}")
+                member.size = len(content)
+                shard.addfile(member, io.BytesIO(content))
+        report("datasets", done, len(collection))
 
 
 def _truth_arrays(truth: Truth) -> dict[str, np.ndarray | None]:

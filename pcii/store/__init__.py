@@ -9,6 +9,7 @@ dataset_writer    Datasets written from images and truth in memory.
 folders           Folders that list their files: hashes, lists of files, and the document that makes a folder
                   a finished one.
 manifests         Manifests as pydantic models; members that they do not name are kept.
+packed_arrays     Groups of arrays packed into one archive, where many small files would be a burden.
 software          The software that a result follows from: versions, hashes of sources, and how those differ.
 suggested_depths  Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
 verification      Comparison of all files of a dataset, a collection, results or an evaluation with its

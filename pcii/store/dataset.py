@@ -24,7 +24,8 @@ from pcii.store.dataset_layout import (
     read_exr,
     read_manifest,
 )
-from pcii.store.folders import Files, check_file, check_free, lists_part
+from pcii.store.folders import Files, check_file, check_free, lists_part, read_part
+from pcii.store.packed_arrays import ARRAYS, read_packed
 from pcii.store.zarr_groups import read_array
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.types.camera_grid import CameraGrid
@@ -227,16 +228,30 @@ class Dataset(ShortForm):
         return self.counts if views is None else views
 
     def has(self, part: str) -> bool:
-        """Whether the manifest lists the file `part`, or files of a folder of this name."""
-        return lists_part(self.manifest.files, part)
+        """Whether the manifest lists the file `part`, or files of a folder of this name, packed or not."""
+        return lists_part([*self.manifest.files, *self.manifest.packed], part)
+
+    @cached_property
+    def _packed(self) -> dict[str, bytes]:
+        """Content of all packed files by their paths."""
+        if ARRAYS not in self.manifest.files:
+            raise InputError(
+                f"{self.path / MANIFEST}: files: there is no {ARRAYS}, which is to hold what is packed"
+            )
+        check_file(self.path, ARRAYS, self.manifest.files[ARRAYS])
+        return read_packed(self.path, self.manifest.packed)
 
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
         K, L, H, W = self.grid.shape_KLHW
         sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
-        files = self.manifest.files
-        return {name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes) for name in names}
+        arrays = dict[str, np.ndarray]()
+        for name in names:
+            path = f"{part}/{name}"
+            files = self._packed if self.manifest.packed else read_part(self.path, self.manifest.files, path)
+            arrays[name] = read_array(self.path, path, files, labels[name], sizes)
+        return arrays
 
 
 def open_dataset(path: str | Path) -> Dataset:

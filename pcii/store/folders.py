@@ -89,6 +89,14 @@ def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool
     raise InputError(f"{path}: {fault}; {REMEDY}")
 
 
+def read_part(root: Path, files: Files, part: str) -> dict[str, bytes]:
+    """Content of the listed files of the folder `part` by their paths; `InputError` as `check_file`."""
+    own = {name: entry for name, entry in files.items() if name.startswith(f"{part}/")}
+    for name, entry in own.items():
+        check_file(root, name, entry)
+    return {name: (root / name).read_bytes() for name in own}
+
+
 def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
     """Paths, relative to `root`, of the files in it that are not listed."""
     present = {path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()}

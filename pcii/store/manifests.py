@@ -132,6 +132,8 @@ class DatasetManifest(Manifest):
     timings_s: dict[str, Seconds] = {}
     versions: dict[str, Text] = {}
     files: Files
+    packed: list[Text] = []
+    """Paths of the files that are in its archive `arrays.zip`."""
 
 
 class CollectionManifest(Manifest):

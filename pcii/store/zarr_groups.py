@@ -1,6 +1,6 @@
 """Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and meaning.
 
-An array is read only if its files have the listed hashes and it is as it would be written here.
+An array is read only if it is as it would be written here.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,7 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import new_folder_safely
-from pcii.store.folders import REMEDY, Files, check_file
+from pcii.store.folders import REMEDY
 from pcii.types.array_labels import Label
 
 CHUNK_ELEMENTS = 1 << 20
@@ -74,20 +74,22 @@ def chunk_shape(shape: Iterable[int]) -> tuple[int, ...]:
     return tuple(chunks)
 
 
-def read_array(root: Path, name: str, files: Files, label: Label, sizes: Mapping[str, int]) -> np.ndarray:
-    """The array `name` (group/array) of the folder `root`, whose `files` have these sizes and hashes.
+def read_array(
+    root: Path, name: str, files: Mapping[str, bytes], label: Label, sizes: Mapping[str, int]
+) -> np.ndarray:
+    """The array `name` (group/array) of the folder `root`, of the content of its `files` by their paths.
 
     `sizes` are the lengths of the axes of `label` by name, as far as they are known. Raises `InputError` for
-    a missing or changed file, and for an array that `new_array` does not write.
+    an array that `new_array` does not write.
     """
     import zarr
+    from zarr.core.buffer.cpu import Buffer
+    from zarr.storage import MemoryStore
 
-    path = root / name
-    own = {file: entry for file, entry in files.items() if file.startswith(f"{name}/")}
-    for file, entry in own.items():
-        check_file(root, file, entry)
+    own = {file: content for file, content in files.items() if file.startswith(f"{name}/")}
     try:
-        stored = zarr.open_array(path, mode="r", zarr_format=3)
+        store = MemoryStore({file: Buffer.from_bytes(content) for file, content in own.items()})
+        stored = zarr.open_array(store, path=name, mode="r", zarr_format=3)
         expected = tuple(sizes.get(dim, size) for dim, size in zip(label.dims, stored.shape, strict=True))
         if stored.shape != expected or stored.chunks != chunk_shape(expected):
             raise ValueError(f"expected a shape of {expected}, got {stored.shape}")
@@ -98,4 +100,4 @@ def read_array(root: Path, name: str, files: Files, label: Label, sizes: Mapping
             raise ValueError(f"expected {stored.nchunks} chunks, the manifest lists {chunks}")
         return np.asarray(stored[...])
     except Exception as fault:  # decoders raise various exceptions for damaged content
-        raise InputError(f"{path}: cannot be read ({visible(str(fault))}); {REMEDY}") from None
+        raise InputError(f"{root / name}: cannot be read ({visible(str(fault))}); {REMEDY}") from None

@@ -23,6 +23,7 @@ from pcii.store.dataset_layout import (
 )
 from pcii.store.folders import list_files
 from pcii.store.manifests import DatasetManifest
+from pcii.store.packed_arrays import ARRAYS, pack_arrays
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
@@ -121,7 +122,8 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
         with _timed(timings_s, "hash"):
             budgets = (None, *recipe.photons.nested)
             parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
-            files = list_files(out, [TRUTH, *parts, RADIANCE])
+            packed = [] if recipe.products.profile == "full" else pack_arrays(out, [TRUTH, *parts])
+            files = list_files(out, [ARRAYS, TRUTH, *parts, RADIANCE])
         manifest = _description(prepared, render_scene) | {
             "identity": identity,
             "backend": engine,
@@ -129,6 +131,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
             "skipped": _skipped(prepared, photons, traced_for_visibility(out), render_scene),
             "timings_s": timings_s,
             "files": files,
+            "packed": packed,
         }
         write_manifest(out, manifest)
         marker.unlink()
@@ -149,7 +152,7 @@ def _write_products(
     products, sensor = recipe.products, recipe.sensor
 
     def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
-        options = {"with_origins": products.truth, "keeps_frames": products.frames}
+        options = {"with_origins": products.origins, "keeps_frames": products.frames}
         return log | write_counts(capture, sensor, arrivals, out, **options)
 
     def make_truth() -> None:

@@ -241,6 +241,9 @@ class Render(Strict):
 class Products(Strict):
     """What the dataset holds beside its manifest."""
 
+    profile: Annotated[Literal["full", "training"], Field(exclude_if=lambda name: name == "full")] = "full"
+    """"training": what networks learn from, packed in one file: photon counts, and of the truth depth,
+    objects and what is in focus; neither normals, coverage nor the origins of photons."""
     counts: bool = True
     """Photon counts of every view: the sums over all frames."""
     frames: bool = False
@@ -262,6 +265,20 @@ class Products(Strict):
         if self.frames and not self.counts:
             raise ValueError("frames: they are those of the counts; set counts = true too")
         return self
+
+    @model_validator(mode="after")
+    def _training_is_of_little(self) -> Self:
+        others = {"radiance": self.radiance != "none", "visibility": self.visibility}
+        others["view_truth"] = bool(self.view_truth)
+        if self.profile == "training" and any(others.values()):
+            names = " and ".join(name for name, is_wanted in others.items() if is_wanted)
+            raise ValueError(f'profile: "training" leaves out {names}; leave {names} out, or profile')
+        return self
+
+    @property
+    def origins(self) -> bool:
+        """Whether the object and depth that each photon comes from are kept."""
+        return self.truth and self.profile == "full"
 
 
 class Analysis(Strict):

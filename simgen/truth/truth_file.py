@@ -37,9 +37,11 @@ def write_truth(
     with new_group_safely(out / TRUTH, {}) as group:
         if products.truth:
             centre = first_hits_at_centre(render_scene, grid)
-            for name in ("z_mm", "object_id", "normal"):
+            is_full = products.profile == "full"
+            for name in ("z_mm", "object_id", *(("normal",) if is_full else ())):
                 _store(group, name, getattr(centre, name))
-            _store(group, "coverage", coverage(render_scene, centre_camera(grid), centre.object_id))
+            if is_full:
+                _store(group, "coverage", coverage(render_scene, centre_camera(grid), centre.object_id))
             if planes_mm:
                 _store(group, "in_focus", in_focus(grid, centre.z_mm, planes_mm))
                 group.attrs["in_focus_z_mm"] = list(planes_mm)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import tarfile
 from dataclasses import asdict
 
 import numpy as np
@@ -87,6 +88,25 @@ def test_datasets_of_a_collection_have_the_same_bytes_as_each_by_itself(collecti
     assert contents(out / "seed_2") == contents(single)
     part = pcii.export_dataset(pcii.open_collection(collection)[1:], format, tmp_path / "part")
     assert contents(part) == contents(single.parent)
+
+
+def test_shards_have_every_dataset_once_with_its_row(collection, tmp_path):
+    out = pcii.export_dataset(collection, "webdataset", tmp_path / "out", budget=10)
+    rows = pcii.open_collection(collection).rows
+    with tarfile.open(out / "all-000000.tar") as shard:
+        shard.extractall(tmp_path / "members", filter="data")
+    contents = {path.name: path.read_bytes() for path in (tmp_path / "members").iterdir()}
+    assert sorted(contents) == [f"{n:06d}.{kind}" for n in range(len(rows)) for kind in ("json", "npz")]
+    for n, row in enumerate(rows):
+        assert json.loads(contents[f"{n:06d}.json"])["path"] == row["path"]
+        single = pcii.export_dataset(collection / row["path"], "events", tmp_path / row["path"], budget=10)
+        assert contents[f"{n:06d}.npz"] == (single / "events.npz").read_bytes()
+    again = pcii.export_dataset(collection, "webdataset", tmp_path / "again", budget=10)
+    assert (again / "all-000000.tar").read_bytes() == (out / "all-000000.tar").read_bytes()
+    one_sentence(
+        lambda: pcii.export_dataset(collection / "seed_2", "webdataset", tmp_path / "one"),
+        collection / "seed_2",
+    )
 
 
 def test_a_collection_is_exported_as_a_whole_or_not_at_all(collection, tmp_path):

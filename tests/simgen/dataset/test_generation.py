@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 import zarr
 from digests import digest
+from stored_datasets import flip_a_bit, one_sentence
 from tiny import TINY_RECIPE
+from zarr.storage import ZipStore
 
 from pcii.base.errors import InputError
 from pcii.store import software
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
+from pcii.store.packed_arrays import ARRAYS
 from pcii.store.verification import verify
 from simgen.cameras.rig import rig_of
 from simgen.dataset import rendered_views
@@ -65,6 +68,28 @@ def test_fewer_samples_of_the_background_are_said_with_what_they_saved(tmp_path:
     manifest = generate(recipe(render=render), Path(), tmp_path / "sparse")
     (saved,) = (entry["saved"] for entry in manifest["skipped"] if "no object can be seen" in entry["what"])
     assert 0 < saved < 3 * 6 * 64 * 60
+
+
+def test_what_is_packed_is_the_same_and_is_read_as_any_other(made: Path, tmp_path: Path) -> None:
+    packed = tmp_path / "packed"
+    generate(recipe(products={"profile": "training"}), Path(), packed)
+    assert {path.name for path in packed.iterdir()} == {MANIFEST, ARRAYS}
+    assert verify(packed) == 1
+    whole, dataset = open_dataset(made), open_dataset(packed)
+    for name in "klijn":
+        np.testing.assert_array_equal(
+            getattr(dataset.counts.events, name), getattr(whole.counts.events, name)
+        )
+    truth, of_whole = dataset.truth, whole.truth
+    assert truth is not None
+    assert of_whole is not None
+    assert truth.photons is None
+    np.testing.assert_array_equal(truth.z_mm, of_whole.z_mm)
+    np.testing.assert_array_equal(dataset.truth_array("in_focus"), whole.truth_array("in_focus"))
+    stored = zarr.open_group(ZipStore(packed / ARRAYS, mode="r"), path=TRUTH, mode="r")
+    assert sorted(stored.array_keys()) == ["in_focus", "object_id", "z_mm"]
+    flip_a_bit(packed / ARRAYS, 5000)
+    one_sentence(lambda: open_dataset(packed).counts, packed / ARRAYS)
 
 
 def test_the_same_recipe_gives_the_same_bytes_and_another_seed_other_photons_of_the_same_truth(
