@@ -19,8 +19,8 @@ DEFINITION: dict[str, Any] = {
     "set": [
         *(f"{name}={value}" for name, value in SMALL.items()),
         "render.samples_per_pixel=1",
-        "publication.licence=CC-BY-4.0",
     ],
+    "publication": {"licence": "CC-BY-4.0"},
     "scene": [
         SCENE | {"name": "pair", "frames": True},
         SCENE | {"name": "wall", "kind": "nothing", "half": "test", "recipe": "blank"},

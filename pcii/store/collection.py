@@ -31,6 +31,8 @@ COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 """Columns of the table beside the swept fields."""
 COLLECTION = "collection.json"
 INDEX = "index.jsonl"
+CROISSANT = "croissant.json"
+"""In the folder of a benchmark: what catalogues of datasets read."""
 CERTIFICATE = "certificate.json"
 """In the folder of a benchmark: how its datasets compare with the published ones."""
 COLLECTION_FOLDER = FolderKind("collection", COLLECTION, 1, "simgen generate", frozenset({COLLECTION}))

@@ -14,14 +14,11 @@ from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
 
 PROJECT = "photon-integral-imaging"
-LICENCE = "BSD-3-Clause"
-"""Licence of this software and of the scenes that come with it, and of data unless another one is named."""
-CREATOR = "The photon-integral-imaging authors"
-CITATION = (
+SOFTWARE = (
     "Photon-starved integral imaging: physically based data, reconstruction and defocus removal "
-    f"({PROJECT}). {CREATOR}."
+    f"({PROJECT}). The photon-integral-imaging authors."
 )
-"""As CITATION.cff has it."""
+"""How to cite the software that made the data, as CITATION.cff has it."""
 INSTALL = f"import pcii  # pip install {PROJECT}"
 """A README.md without this line is somebody else's."""
 TEXT = """# {title}
@@ -39,28 +36,26 @@ X points right, Y down, Z forward, in millimetres; `z` is planar depth. Each arr
 meaning in its attributes. The manifest has the recipe, from which `simgen generate` makes the same data, and
 the SHA-256 of every file, with which `simgen verify` compares them.
 
-Licence: {licence}. By {creators}. Please cite:
+{terms}
 
-> {citation}
+Made with
+
+> {software}
 """
 OPENING = "The data in this folder may be used under the terms of"
 """A LICENSE without this line is somebody else's."""
-LICENCE_TEXT = """{opening} {licence}:
-{address}
-
-By {creators}. Please cite:
-
-{citation}
-"""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Licence, a name of the SPDX list or a URL; who made the data; how to cite them; where they are."""
+    """Licence, a name of the SPDX list or a URL; who made the data; how to cite them; where they are.
 
-    licence: str = LICENCE
-    creators: tuple[str, ...] = (CREATOR,)
-    citation: str = CITATION
+    What is empty is not known, and nothing is put in its place.
+    """
+
+    licence: str = ""
+    creators: tuple[str, ...] = ()
+    citation: str = ""
     url: str = ""
 
     @property
@@ -81,10 +76,12 @@ def write_card(root: Path, terms: Terms) -> None:
     it is there already, so that a folder that is read-only will do.
     """
     if is_collection(root):
-        fields = ", ".join(read_collection(root).fields)
-        title = str(read_collection(root).recipe.get("title") or "Integral images")
+        collection, rows = read_collection(root), read_index(root)
+        scenes = ", ".join(dict.fromkeys(str(row["scene"]) for row in rows))
+        title = str(collection.recipe.get("title") or scenes or "Integral images")
         example = 'dataset = pcii.open_collection("FOLDER")[0]'
-        content = f"A collection of {len(read_index(root))} datasets, which differ in {in_markdown(fields)}."
+        fields = in_markdown(", ".join(collection.fields))
+        content = f"A collection of {len(rows)} datasets, which differ in {fields}."
     else:
         manifest, example = read_manifest(root), 'dataset = pcii.open_dataset("FOLDER")'
         title, grid = manifest.title or "Integral images", manifest.grid
@@ -95,23 +92,35 @@ def write_card(root: Path, terms: Terms) -> None:
         content=f"Integral imaging in little light. {content}",
         install=INSTALL,
         example=example,
-        licence=f"[{in_markdown(terms.licence)}](<{terms.address}>)",
-        creators=", ".join(in_markdown(name) for name in terms.creators),
-        citation=in_markdown(terms.reference),
+        terms=_terms_in_markdown(terms),
+        software=SOFTWARE,
     )
     _write(root, CARD, text, INSTALL)
 
 
+def _terms_in_markdown(terms: Terms) -> str:
+    """Licence, creators and citation in sentences, and what of them nobody has stated."""
+    sentences = ["Licence: none is stated. Ask whoever made the data before you use them."]
+    if terms.licence:
+        sentences = [f"Licence: [{in_markdown(terms.licence)}](<{terms.address}>)."]
+    if terms.creators:
+        sentences.append(f"By {', '.join(in_markdown(name) for name in terms.creators)}.")
+    if not terms.reference:
+        return " ".join(sentences)
+    return f"{' '.join(sentences)} Please cite:\n\n> {in_markdown(terms.reference)}"
+
+
 def write_licence(root: Path, terms: Terms) -> None:
-    """Write LICENSE of a finished dataset or of a collection, on the conditions of `write_card`."""
-    text = LICENCE_TEXT.format(
-        opening=OPENING,
-        licence=visible(terms.licence),
-        address=terms.address,
-        creators=", ".join(map(visible, terms.creators)),
-        citation=visible(terms.reference),
-    )
-    _write(root, LICENCE_FILE, text, OPENING)
+    """Write LICENSE of a finished dataset or of a collection, on the conditions of `write_card`.
+
+    The licence has to be known.
+    """
+    lines = [f"{OPENING} {visible(terms.licence)}:\n{terms.address}"]
+    if terms.creators:
+        lines.append(f"By {', '.join(map(visible, terms.creators))}.")
+    if terms.reference:
+        lines.append(f"Please cite:\n\n{visible(terms.reference)}")
+    _write(root, LICENCE_FILE, "\n\n".join(lines) + "\n", OPENING)
 
 
 def _write(root: Path, name: str, text: str, mark: str) -> None:

@@ -10,6 +10,7 @@ from pcii.base.progress import Report, Stages, silent
 from pcii.store.collection import (
     CERTIFICATE,
     COLLECTION,
+    CROISSANT,
     INDEX,
     check_manifest,
     is_collection,
@@ -86,7 +87,7 @@ def _verify_collection(path: Path, report: Report) -> int:
     for done, row in enumerate(rows, start=1):
         files += 1 + verify(check_manifest(path, row))
         report("verify", done, len(rows))
-    listed = {COLLECTION, INDEX, LOCK, CARD, LICENCE, CERTIFICATE, *(row["path"] for row in rows)}
+    listed = {COLLECTION, INDEX, LOCK, CARD, LICENCE, CERTIFICATE, CROISSANT, *(row["path"] for row in rows)}
     _refuse_unlisted(path, INDEX, entries(path, "collection") - listed)
     return files
 

@@ -34,10 +34,11 @@ from pcii.store.dataset_card import write_card, write_licence
 from pcii.store.folders import hash_json
 from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate
+from simgen.dataset.croissant_file import write_croissant
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions
 from simgen.renderer import backend
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.recipe import Publication, Recipe, load_recipe
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
@@ -88,6 +89,8 @@ class Definition(_Model):
     set: tuple[str, ...] = ()
     """Values that differ from the recipes of all scenes."""
     scene: tuple[Scene, ...]
+    publication: Annotated[Publication, Field(exclude=True)] = Publication()
+    """Terms of all data: no part of what the definition's hash is of, since they change no data."""
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -229,18 +232,14 @@ def make_benchmark(
 
 
 def _write_terms(series: BenchmarkSeries, out: Path) -> None:
-    """README.md and LICENSE of the collection, and of its datasets, which may be passed on alone."""
-    finished = {row["path"] for row in read_index(out)}
-    terms_of = {
-        out / series.folder(number): series.recipe(number).publication.terms()
-        for number in range(len(series))
-        if series.folder(number) in finished
-    }
-    if terms_of:
-        terms_of[out] = next(iter(terms_of.values()))
-    for folder, terms in terms_of.items():
+    """Write README.md and LICENSE of the collection and of its datasets, which may be passed on alone."""
+    definition = series.definition
+    terms = definition.publication.terms()
+    for folder in (out, *(out / row["path"] for row in read_index(out))):
         write_card(folder, terms)
-        write_licence(folder, terms)
+        if terms.licence:
+            write_licence(folder, terms)
+    write_croissant(out, definition.name, definition.title, terms)
 
 
 def published_certificate(file: Path) -> dict[str, Any]:

@@ -124,10 +124,10 @@ class Grid(Strict):
 class Publication(Strict):
     """Terms under which the data may be used, for the dataset's card; no data depend on them."""
 
-    licence: Annotated[Title, Field(min_length=1)] = Terms.licence
+    licence: Title = ""
     """Name of a licence in the SPDX list, such as "CC-BY-4.0", or the URL of another one."""
-    creators: Annotated[tuple[Title, ...], Field(min_length=1)] = Terms.creators
-    citation: Title = Terms.citation
+    creators: tuple[Title, ...] = ()
+    citation: Title = ""
     url: Title = ""
 
     def terms(self) -> Terms:

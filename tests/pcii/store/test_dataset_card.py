@@ -10,7 +10,7 @@ from stored_datasets import make_dataset, rewrite_manifest
 
 from pcii.base.errors import InputError
 from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
-from pcii.store.dataset_card import LICENCE, Terms, write_card, write_licence
+from pcii.store.dataset_card import SOFTWARE, Terms, write_card, write_licence
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
 from pcii.store.verification import verify
@@ -45,6 +45,7 @@ def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
         assert words in text
         assert words in (root / LICENCE_FILE).read_text()
     if make is make_collection:
+        assert text.startswith("# by hand\n")  # the scene, where no title is stated
         assert "2 datasets, which differ in photons.budget" in text
     (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")
     with pytest.raises(InputError, match="not listed in"):
@@ -60,10 +61,13 @@ def test_a_card_follows_the_data_and_the_terms_alone(tmp_path):
     for folder in (root, other):
         write_card(folder, Terms())
     assert (root / CARD).read_bytes() == (other / CARD).read_bytes()
+    text = (root / CARD).read_text()
+    assert "Licence: none is stated." in text  # what nobody has said
+    assert "authors" not in text.replace(SOFTWARE, "")
     before = (root / MANIFEST).read_bytes()
     write_card(root, TERMS)
     assert (root / MANIFEST).read_bytes() == before
-    assert LICENCE not in (root / CARD).read_text()
+    assert "none is stated" not in (root / CARD).read_text()
     (root / CARD).write_text("# My own words")
     write_card(root, TERMS)
     assert (root / CARD).read_text() == "# My own words"

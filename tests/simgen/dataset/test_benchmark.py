@@ -12,8 +12,9 @@ from small_benchmark import SCENE, written
 import pcii
 from pcii.base import command_line
 from pcii.base.errors import InputError
+from pcii.store.collection import CROISSANT, INDEX
 from pcii.store.dataset_layout import CARD, LICENCE
-from pcii.store.folders import hash_json
+from pcii.store.folders import hash_file, hash_json
 from pcii.store.verification import verify
 from simgen.app.commands import app
 from simgen.dataset.benchmark_making import (
@@ -59,6 +60,9 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
     for file in (CARD, LICENCE):
         assert all("CC-BY-4.0" in (folder / file).read_text() for folder in folders)
     assert (made[2] / CARD).read_text().startswith("# two scenes\n")
+    described = json.loads((made[2] / CROISSANT).read_text())
+    assert described["license"] == "https://spdx.org/licenses/CC-BY-4.0.html"
+    assert described["distribution"][0]["sha256"] == hash_file(made[2] / INDEX)
 
 
 def test_making_it_in_two_steps_gives_the_published_bytes(
