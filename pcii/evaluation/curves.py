@@ -61,7 +61,7 @@ def draw_evaluation(
 
 def _accuracies(table: "DataFrame", measure: str) -> "DataFrame":
     """The means of a measure by method and light, beside those of photons per view and seconds."""
-    cells = table[table["measure"] == measure].set_index(["method", "light"])[["mean", "low", "high"]]
+    cells = table[table["measure"] == measure].set_index(["method", "light"])[["n", "mean", "low", "high"]]
     cells = cells.assign(**{end: cells[end].fillna(cells["mean"]) for end in ("low", "high")})
     for name in PLACES:
         places = table[table["measure"] == name].set_index(["method", "light"])["mean"]

@@ -72,24 +72,31 @@ def draw_accuracy(
 ) -> None:
     """Draw a measure of accuracy against photons per view and seconds, as far as they are known.
 
-    `means` has a row for each method and light: `method`, `photons_per_view`, `seconds`, `mean`, and the ends
-    of its interval, `low` and `high`. Each of `methods` has one colour and marker in all charts. What is no
-    share from 0 to 1 has a logarithmic axis. Full light is at no number of photons. `panels` are axes, one
-    for each of `known_places`, of one figure.
+    `means` has a row for each method and light: `method`, `photons_per_view`, `seconds`, `mean`, the ends of
+    its interval, `low` and `high`, and `n`, of how many scenes it is. Each of `methods` has one colour and
+    marker in all charts. Means of fewer scenes than others of the method are hollow, and no line joins them
+    to those: the difference may be that of the scenes. What is no share from 0 to 1 has a logarithmic axis.
+    Full light is at no number of photons. `panels` are axes, one for each of `known_places`, of one figure.
     """
     handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the two
     for axes, place in zip(panels, known_places(means), strict=True):
-        rows = means[means[place].notna()]
+        rows, has_fewer = means[means[place].notna()], False
         for number, method in enumerate(methods):
             own = rows[rows["method"] == method]
             if own.empty:
                 continue
-            bars = np.maximum(0, [own["mean"] - own["low"], own["high"] - own["mean"]])
             style = _line_style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
             if place == "seconds":  # they hardly follow the light, so that a line would go to and fro
                 style["linestyle"] = "none"
-            handles[plot_label(method)] = axes.errorbar(own[place], own["mean"], yerr=bars, **style)
-        axes.set_xlabel(PLACES[place])
+            for n, part in own.groupby("n"):
+                is_whole = n == own["n"].max()
+                face = {} if is_whole else {"markerfacecolor": "none"}
+                bars = np.maximum(0, [part["mean"] - part["low"], part["high"] - part["mean"]])
+                drawn = axes.errorbar(part[place], part["mean"], yerr=bars, **style, **face)
+                if is_whole:
+                    handles[plot_label(method)] = drawn
+                has_fewer |= not is_whole
+        axes.set_xlabel(PLACES[place] + (" (hollow: fewer scenes)" if has_fewer else ""))
         if is_share:
             axes.set_ylim(min(-0.02, rows["low"].min()), 1.02)
         else:

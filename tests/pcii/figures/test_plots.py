@@ -182,6 +182,7 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
             "mean": [0.5, 0.75, 0.25, 0.9],
             "low": [0.25, 0.75, 0.25, 0.9],
             "high": [1.0, 0.75, 0.25, 0.9],
+            "n": 3,
         }
     )
     figure = accuracy_chart(means, ["b", "a"], "IoU", is_share=True)
@@ -198,7 +199,13 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
         texts = [*axes.get_xticklabels(), *axes.get_xticklabels(minor=True)]
         assert numbers <= {text.get_text() for text in texts}
         assert not any("10^" in text.get_text() for text in texts)
+    assert by_photons.get_xlabel() == "photons per view"
     assert accuracy_chart(means.iloc[:0], ["a"], "IoU", is_share=True) is None
+    figure = accuracy_chart(means.assign(n=[2, 3, 3, 3]), ["b", "a"], "IoU", is_share=True)
+    assert figure is not None
+    lines = [line for line in figure.axes[0].lines if len(line.get_xydata()) and line.get_marker() in "os"]
+    assert [line.get_markerfacecolor() == "none" for line in lines] == [False, True, False]  # b, then a
+    assert figure.axes[0].get_xlabel() == "photons per view (hollow: fewer scenes)"
     bins = pd.DataFrame(
         {"method": ["a"], "light": ["x"], "confidence": [0.9], "correct": [0.8], "share": [1.0]}
     )
