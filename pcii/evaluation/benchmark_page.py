@@ -1,7 +1,7 @@
 """One page of all submissions in a folder: lines over light, tables, ranks, and commands."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -142,6 +142,7 @@ def write_page(folder: Path, out: Path) -> int:
             rank_table(ranks(of_scenes, measure), f"{title} over all scenes")
             for measure, title in TITLES.items()
         ],
+        "machines": _machines(rows),
         "submissions": _submission_table(submissions, frame),
     }
     write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
@@ -204,6 +205,16 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
         values = pd.concat([values, bounds.assign(method=comparison.bound)])
         methods.append(comparison.bound)
     return values.assign(method=pd.Categorical(values["method"], methods))
+
+
+def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
+    """Methods by the machines that their seconds are of."""
+    methods: dict[str, list[str]] = {}
+    for row in rows:
+        known = methods.setdefault(row.get("machine", ""), [])
+        if row["method"] not in known:
+            known.append(row["method"])
+    return {machine: sorted(names) for machine, names in sorted(methods.items()) if machine}
 
 
 def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> Table:

@@ -203,7 +203,7 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     assert accuracy_chart(means.iloc[:0], ["a"], "IoU", is_share=True) is None
     figure = accuracy_chart(means.assign(n=[2, 3, 3, 3]), ["b", "a"], "IoU", is_share=True)
     assert figure is not None
-    lines = [line for line in figure.axes[0].lines if len(line.get_xydata()) and line.get_marker() in "os"]
+    lines = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
     assert [line.get_markerfacecolor() == "none" for line in lines] == [False, True, False]  # b, then a
     assert figure.axes[0].get_xlabel() == "photons per view (hollow: fewer scenes)"
     bins = pd.DataFrame(
