@@ -15,7 +15,7 @@ FOLDER = "paper-scene"
 """Its datasets and scores, in the folder of results."""
 SEEDS = 5
 LIGHTS = (100, 300, 1000)
-METHODS = ("three-step", "posterior", "brightness", "variance", "shape-from-focus", "depth")
+METHODS = ("three-step", "posterior", "brightness", "shape-from-focus", "depth")
 MEASURES = ("iou", "photon_precision", "photon_recall", "within_1px", "median_px", "median_mm", "bias_px")
 SETTINGS = ("products.radiance=none", f"photons.budget={LIGHTS[-1]}", f"photons.nested={[*LIGHTS[:-1]]}")
 

@@ -117,7 +117,8 @@ photons.
 ## What is not modelled
 
 Positions, rotations and lenses that are not perfect are [simulated](cameras.md#errors), but depth and
-removal believe the ideal grid: [what that costs](experiments/wrong_cameras.md). Not simulated are cameras of unequal sensitivity, vignetting, rolling
+removal believe the ideal grid: [what that costs](experiments/wrong_cameras.md).
+Not simulated are cameras of unequal sensitivity, vignetting, rolling
 readout, motion, and arrays that are no plane grid with even pitch. The methods assume equal cameras too.
 
 Real single-photon cameras have pixels that count without light. A map of them, measured with the lens

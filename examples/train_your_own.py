@@ -81,7 +81,8 @@ def main(folder: str = "out/training", seconds: float = 2.0) -> None:
         overrides = ["scene=drawn_plain", "products.radiance=none", "photons.budget=10000"]
         simgen.generate_collection("small", folder, [*overrides, "scene_number={range=[7,10]}"])
     options: dict[str, Any] = {"fields": ("sections", "evidence", "truth"), "photons": (100, 10_000)}
-    training = pcii.examples(folder, split="train", crop_px=(128, 128), poses=True, **options)
+    height, width = (min(128, size // 4 * 4) for size in pcii.open_collection(folder)[0].grid.shape_HW)
+    training = pcii.examples(folder, split="train", crop_px=(height, width), poses=True, **options)
     unseen = pcii.examples(folder, split="test", seed=0, **options)
     print(f"{len(training)} datasets to learn from, {len(unseen)} that are not seen")
     shares = right_shares(train(training, seconds), unseen)

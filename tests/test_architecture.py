@@ -184,15 +184,13 @@ def parents(name: str) -> set[str]:
 
 
 @pytest.mark.parametrize("package", ROOMS)
-def test_rooms_are_neither_crowded_nor_empty_and_list_their_files(package: str) -> None:
+def test_rooms_are_neither_crowded_nor_empty_and_say_what_they_are_for(package: str) -> None:
     for room in ROOMS[package]:
         folder = ROOT / package / room.replace(".", "/")
         files = {file.stem for file in folder.glob("*.py")} - {"__init__"}
         assert len(files) <= MOST_FILES, room
         assert len(files) >= FEWEST_FILES, room
-        listed = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
-        for name in files:
-            assert f"\n{name} " in listed, f"{room}/__init__.py does not list {name}"
+        assert ast.get_docstring(ast.parse((folder / "__init__.py").read_text())), room
 
 
 def test_files_are_short() -> None:

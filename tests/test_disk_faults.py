@@ -69,7 +69,11 @@ def works(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Work]:
     place = tmp_path_factory.mktemp("place")
     recipe, one = place / "one.toml", place / "one"
     recipe.write_text(DATASET)
-    generate, method, other = ["generate", str(recipe)], ["--method", "brightness"], ["--method", "variance"]
+    generate, method, other = (
+        ["generate", str(recipe)],
+        ["--method", "brightness"],
+        ["--method", "shape-from-focus"],
+    )
     evaluate, run = ["evaluate", str(one), *method], ["run", str(one), *method]
     assert command_line.run(APPS["simgen"], [*generate, "-o", str(one)]) == 0
     many = [*generate, "--seeds", "3", "--workers", "2"]

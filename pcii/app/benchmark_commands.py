@@ -73,7 +73,7 @@ def run(
             say(
                 f"{data}: {opened.missing} of {whole} datasets of the {half} half are missing; the scores are"
             )
-            say(f"of the others. `simgen benchmark make -o {data}` goes on with it")
+            say(f"of the others. The same `simgen benchmark make -o {data}` goes on with it")
         evaluation = run_method(
             method, opened, out, budgets=budget, executor=executor, report=report, **about
         )
@@ -131,5 +131,6 @@ def say_scores(out: Path, evaluation: Evaluation) -> None:
         say(f"made again: {sentence}")
     for title, table in decisive_means(evaluation.means()):
         say(f"\n{title} by photons per view\n{table}\n")
-    say(f"{out / 'evaluation.html'}: scores of {evaluation.frame['identity'].nunique()} datasets")
+    count = evaluation.frame["identity"].nunique()
+    say(f"{out / 'evaluation.html'}: scores of {count} dataset{'' if count == 1 else 's'}")
     say_next_page(out / "evaluation.html")

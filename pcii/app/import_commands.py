@@ -28,7 +28,7 @@ from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
@@ -157,7 +157,7 @@ def import_dataset(
         say(f"warning: {advice}; then delete {out} and import again")
         return
     if not surfaces:
-        _say_depths(fit)
+        _say_depths(fit, is_counted=isinstance(imported.images, PhotonCounts))
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
@@ -184,8 +184,12 @@ def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, tell: Tell) -> tup
         return ()
     depths_mm, sure = find_surfaces(images, z_range)
     if depths_mm:
-        names = ", ".join(map(_three_digits, depths_mm))
-        tell(f"the depth map has most surfaces at {names} mm; its depths are right with {sure:.0%}")
+        names, farthest_mm = ", ".join(map(_three_digits, depths_mm)), max(depths_mm)
+        grid = images.grid
+        total_px = total_disparity_px(grid, np.array(farthest_mm))
+        px_mm = float(depth_of_total_disparity_mm(grid, total_px - 1)) - farthest_mm
+        within = f"1 px of total disparity, {px_mm:.2g} mm at {_three_digits(farthest_mm)} mm"
+        tell(f"the depth map has most surfaces at {names} mm; {sure:.0%} of its depths are right to {within}")
     return depths_mm
 
 
@@ -201,17 +205,22 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
             for word, names in (("with", flags[True]), ("without", flags[False]))
             if names
         ]
-        return f"the views fit together far better {' and '.join(words)}"
+        better = f"the views fit together far better {' and '.join(words)}"
+        if changes.keys() == {"flip_cols"} and fit.shear_px is not None:
+            return f"{better}, or with --flip-rows: pictures that were shifted do not tell which"
+        if changes.keys() == {"flip_cols"}:
+            return f"{better}, unless they were shifted along x or y alone, which --shear-px states"
+        return better
     if fit.shear_px is not None:
         x, y = fit.shear_px
-        return f"things are sharp at disparities below 0; add a shift to --shear-px, {x:g} {y:g} or more"
+        return f"things are sharp at disparities below 0; add a shift to --shear-px, such as {x:g} {y:g}"
     if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
         where = f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm"
         return f"{where}; correct the range, --pitch-mm, --focal-mm or the size of pixels"
     return None
 
 
-def _say_depths(fit: CameraFit) -> None:
+def _say_depths(fit: CameraFit, *, is_counted: bool) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
     if fit.z_mm:
         say(f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm")
@@ -219,9 +228,9 @@ def _say_depths(fit: CameraFit) -> None:
         say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
     else:
         say(
-            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; correct the "
-            "order of views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by "
-            "--z-mm"
+            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; "
+            f"{'in little light --z-range-mm finds more; else ' if is_counted else ''}correct the order of "
+            "views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
         )
 
 

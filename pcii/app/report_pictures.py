@@ -170,7 +170,11 @@ def input_panels(pictures: Pictures) -> list[Panel]:
 def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
     """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
     outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
-    true = None if truth is None else TrueFocus(outcome.sections.planes, truth).by_object  # (Z, H, W)
+    true, what = None, "objects"
+    if truth is not None:
+        focus = TrueFocus(outcome.sections.planes, truth)
+        true = focus.by_object if truth.are_objects_known else focus.by_pixel  # (Z, H, W)
+        what = "objects" if truth.are_objects_known else "what is in focus"
     images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px, pictures.box))
     lights = {pictures.light: images}
     if outcome.dataset.has_counts and outcome.full_light is not None:
@@ -181,7 +185,7 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
     for plane, z in enumerate(outcome.sections.z_mm):
         sections = [_photo(light[plane], f"section at {z:g} mm, {words}") for words, light in lights.items()]
         if true is not None:
-            sections.append(_drawing(mask_image(middles(true[plane])), f"truth: objects at {z:g} mm"))
+            sections.append(_drawing(mask_image(middles(true[plane])), f"truth: {what} at {z:g} mm"))
         masks: list[Panel] = []
         for focus in outcome.focus:
             claim = middles(focus.in_focus[plane])

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.tables import Table
+from pcii.types.truth import Truth
 
 NUMBERS = {
     "iou": "IoU",
@@ -54,8 +55,11 @@ def score_table(outcome: Outcome) -> Table:
     """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
     rows = [{**row, "everything": row["everything"]["iou"]} for row in outcome.score.planes]
     words = ["plane", "method", "truth", "objects"]
-    if outcome.dataset.truth is None:
+    truth = outcome.dataset.truth
+    if truth is None:
         words, rows = words[:2], [row for row in rows if row["truth"] == "object"]
+    elif not truth.are_objects_known:
+        rows = [row for row in rows if row["truth"] == "pixel"]
     numbers = [key for key in NUMBERS if any(row[key] is not None for row in rows)]
     cells: list[tuple[str, ...]] = []
     for row in rows:
@@ -70,10 +74,13 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
     """Lines for a terminal: IoU by method and plane, then how right depth is, as far as the truth tells."""
     import pandas as pd
 
-    by_object = [row for row in outcome.score.planes if row["truth"] == "object" and row["iou"] is not None]
-    if by_object:
-        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or 'nothing'}" for row in by_object}
-        iou = pd.DataFrame(by_object).pivot(index="method", columns="z_mm", values="iou")
+    truth = outcome.dataset.truth
+    kind = "object" if truth is None or truth.are_objects_known else "pixel"
+    rows = [row for row in outcome.score.planes if row["truth"] == kind and row["iou"] is not None]
+    if rows:
+        other = "nothing" if kind == "object" else "all in focus"
+        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or other}" for row in rows}
+        iou = pd.DataFrame(rows).pivot(index="method", columns="z_mm", values="iou")
         iou.index.name = iou.columns.name = None
         shown = iou.rename(columns=columns).to_string(float_format="{:.3f}".format, na_rep="–")
         yield f"IoU of the masks\n{shown}"
@@ -81,7 +88,14 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
     if depth["within_1px"] is not None:
         names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
         shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
-        yield f"Depth, shares of the objects' pixels\n{shares.to_string(float_format='{:.3f}'.format)}"
+        yield f"Depth, shares of {_pixels_of_depth(truth)}\n{shares.to_string(float_format='{:.3f}'.format)}"
+
+
+def _pixels_of_depth(truth: Truth | None) -> str:
+    """Of which pixels the errors of depth are."""
+    return (
+        "the objects' pixels" if truth is not None and truth.has_objects else "all pixels with a true depth"
+    )
 
 
 def depth_table(outcome: Outcome) -> Table:
@@ -89,9 +103,7 @@ def depth_table(outcome: Outcome) -> Table:
     depth, truth = outcome.score.depth, outcome.dataset.truth
     rows: list[tuple[str, str]] = []
     if depth["coverage"] is not None:
-        has_objects = truth is not None and truth.has_objects
-        where = "the objects' pixels" if has_objects else "all pixels with a true depth"
-        rows.append((f"share with an estimate, of {where}", f"{depth['coverage']:.1%}"))
+        rows.append((f"share with an estimate, of {_pixels_of_depth(truth)}", f"{depth['coverage']:.1%}"))
         for limit in (1, 3):
             name = f"within {limit} px of total disparity (by the best answer of one depth everywhere)"
             of_one_depth = depth["one_depth"][f"within_{limit}px"]

@@ -93,7 +93,10 @@ def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: 
     if not depths_mm:
         raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
     names = ", ".join(f"{z:.4g}" for z in depths_mm)
-    say(f"looking at {names} mm, where the depth map has most surfaces; its depths are right with {sure:.0%}")
+    say(
+        f"looking at {names} mm, where the depth map has most surfaces; {sure:.0%} of its depths are right "
+        "to 1 px of total disparity"
+    )
     return FocalPlanes.at_depths(data.grid, depths_mm)
 
 

@@ -1,4 +1,4 @@
-"""Textbook methods of removal to compare others with: by brightness, by variance, by sharpness.
+"""Textbook methods of removal to compare others with: by brightness, and by sharpness.
 
 Each uses a single cue, in windows whose size follows from the number of photons. All work on the square root
 of the photons in a window, whose noise does not depend on the brightness (see
@@ -7,13 +7,11 @@ of the photons in a window, whose noise does not depend on the brightness (see
 
 import numpy as np
 
-from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
 from pcii.imaging.bright_regions import brightness as root_photons
-from pcii.sections.photon_statistics import pooled_estimate, section_window_px, view_samples
-from pcii.sections.reconstruction import extend, view_coverage, with_probes
+from pcii.sections.photon_statistics import pooled_estimate, section_window_px
+from pcii.sections.reconstruction import extend, with_probes
 from pcii.types.estimates import Segmented
-from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
 
@@ -22,12 +20,6 @@ NOISE = 0.5
 LEAST_CONTRAST_SIGMAS = 4.0
 """Least contrast of the two classes: noise divided at its mean has classes 2 sqrt(2 / pi) = 1.6 sigma
 apart."""
-WINDOW_CELLS = 4
-PHOTONS_PER_VIEW = 10.0
-LARGEST_CELL_PX = 8
-"""The variance test pools over 4 x 4 cells, as large as needed for about 10 photons of a view."""
-POISSON_QUANTILE = 0.999
-"""The variance test rejects values that Poisson noise exceeds in one window of a thousand."""
 FOCUS_WINDOW = 6
 """Sharpness is summed over this many pooling windows along each axis."""
 
@@ -39,21 +31,6 @@ def brightness(counts: PhotonCounts, sections: Sections) -> Segmented:
     """
     bright = _bright(_root_photons(sections, section_window_px(sections)))
     return Segmented(bright, "brightness", sections)
-
-
-def variance(counts: PhotonCounts, sections: Sections) -> Segmented:
-    """Bright points whose variance over the views is that of Poisson noise are in focus.
-
-    Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point is distributed as
-    chi-square with V - 1 degrees of freedom if all views have the same rate. A sample x is the photons of one
-    view in a square window of even side, which has equally many pixels of each Bayer colour, large enough for
-    about 10 photons where the section is bright. `steps` holds `bright` and `even`, the outcome of the test.
-    """
-    window_px = section_window_px(sections)
-    bright = _bright(_root_photons(sections, window_px))
-    cell_px = _cell_px(pooled_estimate(sections, window_px), bright)
-    even = np.stack([_is_even(counts, sections.planes, p, cell_px) for p in range(len(bright))])
-    return Segmented(bright & even, "variance", sections, {"bright": bright, "even": even})
 
 
 def shape_from_focus(counts: PhotonCounts, sections: Sections) -> Segmented:
@@ -110,35 +87,3 @@ def _bright(image: np.ndarray) -> np.ndarray:
         is_significant = contrast > LEAST_CONTRAST_SIGMAS * NOISE
         masks.append(without_specks(mask & is_significant, SMALLEST_REGION_PX))
     return np.stack(masks)
-
-
-def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
-    """Cell size at which a window of `WINDOW_CELLS` has about 10 photons per view where it is bright."""
-    if not bright.any():
-        return LARGEST_CELL_PX
-    per_pixel = float(pooled.mean(axis=-1)[bright].mean())
-    window_px = np.sqrt(PHOTONS_PER_VIEW / per_pixel)
-    return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
-
-
-def _is_even(counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int) -> np.ndarray:
-    """Where the variance over the views is that of Poisson noise, or 0, (H, W) bool."""
-    from scipy.special import chdtri
-
-    samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
-    views = _views(planes.take([plane]), cell_px)
-    total = samples.number * samples.mean
-    squares = np.maximum(samples.number - 1, 0) * samples.variance + samples.mean * total
-    dispersion = views * squares / np.maximum(total, 1) - total
-    # chdtri is the inverse of the upper tail.
-    even = dispersion <= chdtri(np.maximum(views - 1, 1), 1 - POISSON_QUANTILE)
-    return on_pixels(even, cell_px, counts.grid.shape_HW)
-
-
-def _views(planes: FocalPlanes, cell_px: int) -> np.ndarray:
-    """How many views cover the middle of each cell of the first plane, at least 1."""
-    grid = planes.grid
-    coverage = view_coverage(planes)[0].astype(np.float64)
-    rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in grid.shape_HW)
-    middle = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
-    return np.maximum(coverage[middle], 1)

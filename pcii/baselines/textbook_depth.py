@@ -10,7 +10,6 @@ plane with the clearest slope decides.
 """
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,8 @@ STEP_PX = 1.0
 BATCH = 8
 """Planes made at a time: views that stay on disk are read once for all of them."""
 VARIANCE_WINDOW_PX = 7
+WINDOW_PX = 17
+"""Of the likelihood: smaller windows show finer things in much light, larger ones large things in little."""
 SIGMAS_PER_WINDOW = 4
 """The middle 95 % of a Gaussian window of the likelihood are as wide as the window."""
 WIDER = 2.0
@@ -68,7 +69,7 @@ def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) 
     return _swept(data, z_range_mm, evenness, variance=True)
 
 
-def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float], window_px: float) -> DepthMap:
+def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthMap:
     """The depth at which the photons of each view are predicted best by those of the other views.
 
     The rate of a sample of m photons, of a voxel of K photons in n samples, is
@@ -78,7 +79,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float], window
     """
     from scipy.ndimage import gaussian_filter
 
-    sigma_px = window_px / SIGMAS_PER_WINDOW
+    sigma_px = WINDOW_PX / SIGMAS_PER_WINDOW
     events = data.events
     squared = None  # where no pixel has two photons they are their own squares; beyond 2^40 they are refused
     if events.n.max(initial=0) > 1:
@@ -115,10 +116,6 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float], window
         return gaussian_filter(nats.sum(axis=-1), sigma_px / side, mode="constant")
 
     return _swept(data, z_range_mm, gain, side)
-
-
-sweep_9, sweep_17, sweep_33 = (partial(likelihood_sweep, window_px=width) for width in (9, 17, 33))
-"""Windows that show fine things in much light, and large things in little."""
 
 
 def _swept(

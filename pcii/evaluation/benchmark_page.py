@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.curves import accuracy_plot
+from pcii.evaluation.method_names import estimator_of, known_methods
 from pcii.evaluation.pages import ABOUT_YARDSTICKS, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
@@ -18,6 +19,7 @@ from pcii.evaluation.summary import (
     Kind,
     means,
     means_over_scenes,
+    ranked_over,
     ranks,
     with_yardsticks,
 )
@@ -138,10 +140,7 @@ def write_page(folder: Path, out: Path) -> int:
             for comparison in COMPARISONS
             if comparison.measure in set(of_cells["measure"])
         ],
-        "ranks": [
-            rank_table(ranks(of_scenes, measure), f"{title} over all scenes")
-            for measure, title in TITLES.items()
-        ],
+        "ranks": [_ranks(of_scenes, measure, title) for measure, title in TITLES.items()],
         "machines": _machines(rows),
         "submissions": _submission_table(submissions, frame),
     }
@@ -207,6 +206,11 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
     return values.assign(method=pd.Categorical(values["method"], methods))
 
 
+def _ranks(frame: "DataFrame", measure: str, title: str) -> Table:
+    unit = ranked_over(frame, measure)
+    return rank_table(ranks(frame, measure), f"{title} over all {unit}", unit)
+
+
 def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
     """Methods by the machines that their seconds are of."""
     methods: dict[str, list[str]] = {}
@@ -223,8 +227,13 @@ def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "Data
     rows = []
     for folder, about in submissions.items():
         for method in filter(scores.__contains__, about.methods):
-            work = ["run", about.command_name or method] if about.is_run else ["score", "MAPS"]
+            name = about.command_name or method
+            work = ["run", name] if about.is_run else ["score", "MAPS"]
             options = ["--data", "BENCHMARK", "--half", about.half, "-o", f"submissions/{folder.name}"]
+            command = shlex.join(["pcii", "benchmark", *work, *options])
+            is_known = name in known_methods() or ":" in (estimator_of(name) or name)
+            if about.is_run and not is_known:
+                command = "no method of this name is installed"
             rows.append(
                 (
                     method,
@@ -232,7 +241,7 @@ def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "Data
                     about.url or "–",
                     about.trained_on or "–",
                     str(scores[method]),
-                    shlex.join(["pcii", "benchmark", *work, *options]),
+                    command,
                 )
             )
     header = ("method", "authors", "url", "trained on", "scores", "command")

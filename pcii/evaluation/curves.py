@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 AXES = {
-    "iou": "IoU, mean over planes that hold objects",
+    "iou": "IoU, mean over planes with objects",
     "pixel_iou": "IoU with the points in focus, mean over planes",
     "false_share": "share of the film claimed falsely",
     "within_1px": "share of depths within 1 px",

@@ -63,9 +63,10 @@ def examples(
     `split_of`), or with `shares` of the three (in the order train, validation, test) by a hash of the scene,
     so that no scene is in two of them, or `by` the seed of a single scene. `photons` are the least and the
     most per view: each access draws a number in between, evenly by its logarithm but no more than the dataset
-    has, and keeps as many. `crop_px` (rows, columns) takes a part at a random place; `poses` mirrors at
-    random, and transposes where films or parts are square. Each access is another draw; with a `seed` it
-    follows from the seed, the `epoch` of the examples, which you count up, and the number.
+    has, and keeps as many. `crop_px` (rows, columns), multiples of 4, takes a part at a random place; `poses`
+    mirrors at random, and transposes where films or parts are square; `counts` then have rows and columns of
+    cameras exchanged. Each access is another draw; with a `seed` it follows from the seed, the `epoch` of the
+    examples, which you count up, and the number.
 
     Raises `InputError` for a field, split or number that cannot be, and on access for what a dataset lacks.
     """
@@ -262,7 +263,8 @@ def _of_split(
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
     mask = [each == split for each in splits]
     if not any(mask):
-        raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by='seed'")
+        other = "scene" if by == "seed" else "seed"
+        raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by={other!r}")
     if isinstance(data, Collection):
         return data[mask]
     return [dataset for dataset, is_wanted in zip(data, mask, strict=True) if is_wanted]

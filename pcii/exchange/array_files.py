@@ -4,6 +4,7 @@ A .npy file is mapped into memory, and read piece by piece; of other files an ar
 """
 
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +43,7 @@ def open_array(path: Path, key: str | None = None) -> np.ndarray:
         elif head.startswith(b"MATLAB 5.0") or path.suffix.lower() == ".mat":
             numbers = _read_matlab(path, key)
         elif zipfile.is_zipfile(path):
-            with np.load(path, allow_pickle=False) as archive:
-                arrays = dict(archive)
-            numbers = arrays[_chosen(path, key, {name: array.shape for name, array in arrays.items()})]
+            numbers = _read_archive(path, key)
         elif key is not None:
             raise InputError(f"{path}: --key is for .npz, .mat and HDF5 files, and this has one array")
         else:
@@ -59,6 +58,16 @@ def open_array(path: Path, key: str | None = None) -> np.ndarray:
             "or HDF5 file"
         ) from None
     return numbers
+
+
+def _read_archive(path: Path, key: str | None) -> np.ndarray:
+    """An array of a .npz file, in which objects may be beside it."""
+    arrays: dict[str, np.ndarray] = {}
+    with np.load(path, allow_pickle=False) as archive:
+        for name in archive.files:
+            with suppress(ValueError):  # of objects, which are not read
+                arrays[name] = archive[name]
+    return arrays[_chosen(path, key, {name: array.shape for name, array in arrays.items()})]
 
 
 def _read_matlab(path: Path, key: str | None) -> np.ndarray:

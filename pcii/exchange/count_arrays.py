@@ -152,8 +152,8 @@ def import_counts(
             piece = np.array(array[start : min(start + most, stop)])
             if isinstance(array, np.memmap):
                 array = stack.load()  # a new map, so that what was read leaves memory
-            if number == 0 and start == begin and stored in (AS_COUNTED, FrameFormat(mask=stored.mask)):
-                warn_of_numbers(name, piece, tell)
+            if number == 0 and start == begin:
+                warn_of_numbers(name, piece, stored, tell)
             counts = stored.counts_of(stack.name, piece, dead)
             if cfa is not None and counts.ndim == 4:
                 counts = mosaic(counts, cfa)
@@ -240,7 +240,8 @@ def _by_camera(
             raise InputError(f"{name}: expected {expected}, got {numbers.shape}")
         axes = "KL" if grid is None else "N"
         count = np.prod(numbers.shape[: len(axes)], dtype=np.int64)
-        is_known = numbers.ndim - len(axes) < 2 or numbers.shape[-1] in (3, 4)  # colours have a sentence
+        # Colours of single pictures have a sentence of their own.
+        is_known = numbers.ndim - len(axes) < 2 or (numbers.ndim == 4 and numbers.shape[-1] in (3, 4))
         if not is_known and count > max(MANY_VIEWS, np.prod(numbers.shape[len(axes) :], dtype=np.int64)):
             raise InputError(
                 f"{name}: {numbers.shape} would be more views than each has numbers; name the order of its "

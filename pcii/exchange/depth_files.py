@@ -29,6 +29,8 @@ class DepthFile:
     depth: Path | None = None
     """True depth in the image of the virtual centre camera, which of an odd grid is the middle view: PNG,
     TIFF, EXR, PFM or an array. 0, NaN and the largest whole number are unknown; infinity is nothing."""
+    depth_key: str | None = None
+    """Name of the map in a .npz, .mat or HDF5 file of several arrays."""
     depth_unit_mm: float = 1.0
     """What a depth of 1 stands for in mm: 1000 of a file in metres."""
     depth_along_ray: bool = False
@@ -41,13 +43,13 @@ class DepthFile:
         for depths that are not from 0.1 mm to 100 km.
         """
         if self.depth is None:
-            if self.depth_along_ray or self.depth_unit_mm != 1:
-                raise InputError("--depth-unit-mm, --depth-along-ray: are for a file of --depth")
+            if self != NO_DEPTH:
+                raise InputError("--depth-key, --depth-unit-mm, --depth-along-ray: are for a file of --depth")
             return None
         if not 0 < self.depth_unit_mm < np.inf:
             raise InputError(f"--depth-unit-mm: expected a length above 0, got {self.depth_unit_mm:g}")
         path = Path(self.depth)
-        numbers = _numbers_in(path)
+        numbers = _numbers_in(path, self.depth_key)
         if numbers.shape != grid.shape_HW:
             raise InputError(
                 f"--depth: {path} is {numbers.shape}, and views are {grid.shape_HW}, rows x columns"
@@ -69,6 +71,11 @@ class DepthFile:
             )
         hit = z_mm[np.isfinite(z_mm)]
         reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
+        if hit.size and hit.max() < grid.focal_mm:
+            tell(
+                f"warning: {path.name} has depths of {reach}, nearer than the focal length of "
+                f"{grid.focal_mm:g} mm; if they are in metres, import again with --depth-unit-mm 1000"
+            )
         tell(f"with the true depth of the virtual centre, {reach}, from {path.name}")
         if is_unknown.any():
             count = np.count_nonzero(is_unknown)
@@ -78,6 +85,7 @@ class DepthFile:
             np.where(is_unknown, UNKNOWN, 0).astype(np.int16),
             {UNKNOWN: "unknown depth"} if is_unknown.any() else {},
             unscored=frozenset({UNKNOWN} if is_unknown.any() else ()),
+            are_objects_known=False,
         )
 
 
@@ -85,11 +93,14 @@ NO_DEPTH = DepthFile()
 """Views without a map of true depth."""
 
 
-def _numbers_in(path: Path) -> np.ndarray:
+def _numbers_in(path: Path, key: str | None) -> np.ndarray:
     """The numbers (H, W) of a file of depth."""
     kind = kind_of(path) if path.is_file() else None
     if kind is None:
-        return np.squeeze(open_array(path))
+        try:
+            return np.squeeze(open_array(path, key))
+        except InputError as fault:
+            raise InputError(str(fault).replace("--key", "--depth-key")) from None
     channel = _depth_channel(path) if kind == "EXR" else None
     if channel is not None:
         return channel

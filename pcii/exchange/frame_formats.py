@@ -121,12 +121,14 @@ class FrameFormat:
                 )
             counts = counts[:, :, :width]
         else:
+            if dead is not None:  # whose marks are no counts
+                stored = np.where(_like(dead, stored), 0, stored)
             if self.offset is not None or self.gain is not None:
                 photons = (stored.astype(np.float64) - (self.offset or 0)) / (self.gain or 1)
                 stored = photons.round().clip(min=0)
             counts = whole_counts(name, stored)
         if dead is not None:
-            counts = np.where(dead[..., None] if counts.ndim == 4 else dead, 0, counts)
+            counts = np.where(_like(dead, counts), 0, counts)
         limit = None if self.bits is None else (1 << self.bits) - 1
         if limit is not None and counts.max(initial=0) > limit:
             raise InputError(f"{name}: counts to {counts.max()}, and --bits {self.bits} hold {limit}")
@@ -154,17 +156,30 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def warn_of_numbers(name: str, stored: np.ndarray, tell: Tell) -> None:
-    """Warn of frames (T, H, W[, 3]) whose numbers look like packed bits, multiples, marks, or an offset."""
-    if stored.dtype.kind not in "iu":
+def _like(dead: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Dead pixels (H, W) with the axes of frames (T, H, W[, 3])."""
+    return dead[..., None] if frames.ndim == 4 else dead
+
+
+def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, tell: Tell) -> None:
+    """Warn of frames (T, H, W[, 3]) whose numbers look like packed bits, multiples, marks, or an offset.
+
+    What is `stated` of them is not questioned.
+    """
+    if stored.dtype.kind not in "iu" or stated.bitpack or not stated.offset == stated.gain is None:
         return
     step = int(np.gcd.reduce(stored, axis=None))
     if step > 1 and np.count_nonzero(stored) * np.log(step) > SURE_NATS:
         advice = f"if that is one photon, give --gain {step}"
+        advice += "; if the bytes of each number are in the other order, swap them" if step % 256 == 0 else ""
         tell(f"warning: all numbers of {name} are multiples of {step}; {advice}")
+        return
+    if stated.bits is not None:
         return
     most = np.iinfo(stored.dtype).max
     marks = int(np.count_nonzero(stored == most))
+    if not marks:
+        _warn_of_full_frames(name, stored, tell)
     if marks:
         bits = 8 * stored.dtype.itemsize
         advice = "give --mask FILE if that marks dead pixels"
@@ -187,6 +202,19 @@ def warn_of_numbers(name: str, stored: np.ndarray, tell: Tell) -> None:
             f"warning: no number of {name} is below {least:g}, and they scatter about {median:g} by "
             f"{median - low:g}, where photon counts would by {np.sqrt(median):.2g}: subtract what the camera "
             "reads without light with --offset, and divide by what a photon adds with --gain"
+        )
+
+
+def _warn_of_full_frames(name: str, stored: np.ndarray, tell: Tell) -> None:
+    """Warn of numbers that pile up at the largest that some bits hold: pixels stop counting there."""
+    top = int(stored.max(initial=0))
+    if top < 3 or top & (top + 1):
+        return
+    full, next_to_it = (int(np.count_nonzero(stored == value)) for value in (top, top - 1))
+    if full > 2 * next_to_it + SURE_NATS:
+        tell(
+            f"warning: {full / stored.size:.2g} of the numbers of {name} are {top}, more than are {top - 1}: "
+            f"if frames are full there, give --bits {top.bit_length()}"
         )
 
 

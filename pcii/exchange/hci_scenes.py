@@ -106,7 +106,7 @@ def import_hci(
         is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
         if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
             raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
-        truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {})
+        truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
         tell(f"with the true depth of the virtual centre, {maps[0]}")
     files = {path.name for path in root.iterdir() if path.is_file()}
     unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})

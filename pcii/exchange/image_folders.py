@@ -195,6 +195,11 @@ def files_by_camera(
         view = next(view for view in views if view not in files)
         numbers_of = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
         raise InputError(f"{folder}: {count} of {table[0]} x {table[1]} views missing, first {numbers_of}")
+    frames = set().union(*files.values())
+    for view, of_view in files.items():
+        if lacking := frames.difference(of_view):
+            where = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
+            raise InputError(f"{folder}: frame {min(lacking)} of the view {where} is missing; others have it")
     paths = np.empty(len(files), dtype=object)
     for place, view in enumerate(sorted(files)):
         ordered = tuple(files[view][frame] for frame in sorted(files[view]))

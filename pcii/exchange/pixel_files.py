@@ -41,6 +41,10 @@ SRGB_GAMMA = 0.45455
 """What a PNG file of sRGB may state as its gamma."""
 SRGB_PRIMARIES = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
 """Chromaticities (x, y) of red, green, blue and white, as an EXR file may state them."""
+PNG_PRIMARIES = (*SRGB_PRIMARIES[6:], *SRGB_PRIMARIES[:6])
+"""The same of a PNG file, where white comes first."""
+LARGEST_ENCODED = 2.0
+"""Floats that stand for sRGB or have a gamma are 1 at white, and little more in sharpened pictures."""
 UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
 Encoding = Literal["srgb", "linear"] | float
@@ -190,6 +194,10 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None
     share = numbers / np.float32(full) if is_whole else numbers
     if encoding != "linear" and not is_whole and share.size and share.min() < 0:
         raise InputError("holds numbers below 0, which no encoded light has")
+    if encoding != "linear" and not is_whole and share.size and share.max() > LARGEST_ENCODED:
+        raise InputError(
+            f"holds numbers up to {share.max():g}; encoded light is 1 at white: divide by its number"
+        )
     with np.errstate(over="ignore"):
         if encoding == "srgb":
             share = srgb_to_linear(share)
@@ -214,8 +222,12 @@ def _read_pillow(path: Path) -> Picture:
             raise InputError(f"holds {count} pictures; give a file with one")
         unused = f"{count - 1} more pictures" if count != 1 else _profile(image.info.get("icc_profile"))
         gamma = image.info.get("gamma", SRGB_GAMMA)
-        if "srgb" not in image.info and abs(gamma - SRGB_GAMMA) > 0.01 and not unused:
-            unused = f"the gamma of {gamma:g}"
+        primaries = image.info.get("chromaticity", PNG_PRIMARIES)
+        if "srgb" not in image.info and not unused:
+            if abs(gamma - SRGB_GAMMA) > 0.01:
+                unused = f"the gamma of {gamma:g}"
+            elif not np.allclose(primaries, PNG_PRIMARIES, atol=1e-3):
+                unused = "the chromaticities"
         image.load()  # a PNG may have its orientation after its pixels
         orientation = image.getexif().get(0x0112, UPRIGHT)
         if stored.endswith("16B"):  # of which Pillow keeps 8 bits
@@ -269,13 +281,23 @@ def _read_tiff(path: Path) -> Picture:
             alpha=len(page.extrasamples) == 1,
             bits=page.bitspersample if fewer else None,
             orientation=page.tags.valueof(274, default=UPRIGHT),
-            unused=_profile(page.tags.valueof(34675)),
+            unused=" and ".join(filter(None, [_profile(page.tags.valueof(34675)), *_raw_tags(page.tags)])),
         )
 
 
 def _profile(content: bytes | None) -> str:
-    """What is said of an ICC profile: nothing of that of sRGB."""
-    return "" if not content or b"sRGB" in content.replace(b"\0", b"") else "the colour profile"
+    """What is said of an ICC profile: nothing of that of sRGB, of which there are linear ones too."""
+    text = (content or b"").replace(b"\0", b"")
+    return "" if not text or (b"sRGB" in text and b"inear" not in text) else "the colour profile"
+
+
+def _raw_tags(tags: Any) -> Iterator[str]:
+    """What is said of the tags of raw pictures (TIFF/EP, DNG) in a TIFF file."""
+    if 33422 in tags:
+        cells = "".join("RGB"[colour] if colour < 3 else "?" for colour in tags[33422].value)
+        yield f"the Bayer pattern {cells} (--cfa {cells})"
+    if 50714 in tags or 50717 in tags:
+        yield "the levels of black and white"
 
 
 def _read_exr(path: Path) -> Picture:
@@ -287,6 +309,7 @@ def _read_exr(path: Path) -> Picture:
         header = file.parts[0].header
         window, display = (np.ravel(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
         primaries = header.get("chromaticities", SRGB_PRIMARIES)
+        aspect = header.get("pixelAspectRatio", 1.0)
     if window != display:
         raise InputError("its data window is not its display window; save the whole picture")
     with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
@@ -298,6 +321,6 @@ def _read_exr(path: Path) -> Picture:
         alpha, others = "A" in channels, sorted({*channels} - {*colours, "A"})
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
     unused = f"the channels {', '.join(others)}"[:80] if others else ""
-    if not np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3):
-        unused += " and the chromaticities" if unused else "the chromaticities"
-    return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=unused)
+    said = [unused, "" if np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3) else "the chromaticities"]
+    said.append("" if aspect == 1 else f"the pixel aspect ratio of {aspect:g}")
+    return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=" and ".join(filter(None, said)))

@@ -7,10 +7,4 @@ Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or el
 `pyplot`, and returns them as an array (N,), one for each panel. It takes them as a list, one panel's alone
 too. Where no depth is answered a picture is grey, a colour that no map of values has. Matplotlib is imported
 on the first picture.
-
-charts    Charts of scores: accuracy against photons and seconds, reliability of confidence.
-exposure  How photons become an image: blocks, smoothing, means, one exposure for several images.
-panels    Axes to draw in, pictures over the pixels of a view, colour bars.
-pictures  Light, masks, depth and errors as 8-bit sRGB, and their files.
-plots     What each type shows of itself: `.plot()` of all, and their page in notebooks.
 """

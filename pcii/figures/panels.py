@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """The palette of Okabe and Ito, which the colour-blind can distinguish."""
-MARKERS = "osD^vPX"
+MARKERS = "osD^vPXh"
+"""One more than colours, so that no two methods of many share both."""
 GRID_COLOUR = "#8a94a6"
 """Of lines behind what is drawn: seen on light and on dark pages."""
 MAX_PANELS = 12

@@ -100,7 +100,7 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
         for kind in KINDS:
             names = [] if true is None or kind == "pixel" else true.names_at(plane)
             mask = share = is_free = None
-            if true is not None:
+            if true is not None and (kind == "pixel" or true.truth.are_objects_known):
                 mask, coverage, ids = true.masks(kind)[plane], true.truth.coverage, true.truth.object_id
                 share = None if coverage is None else object_share(mask, ids, coverage)
                 is_free = true.is_free(kind, ids, true.blur_px[plane])

@@ -75,7 +75,6 @@ METHODS: dict[str, plugins.Method | str] = {
     "three-step": ThreeStep(),
     "posterior": remove_by_network,
     "brightness": "pcii.baselines.simple_removals:brightness",
-    "variance": "pcii.baselines.simple_removals:variance",
     "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",
 }
 """The built-in methods; those to compare with are loaded when they are asked for."""

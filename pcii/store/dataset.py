@@ -184,8 +184,13 @@ class Dataset(ShortForm):
         arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
         photons = self._photon_truth()
         try:
-            unscored = frozenset(self.manifest.unscored)
-            return Truth(**arrays, names=self.manifest.objects, photons=photons, unscored=unscored)
+            return Truth(
+                **arrays,
+                names=self.manifest.objects,
+                photons=photons,
+                unscored=frozenset(self.manifest.unscored),
+                are_objects_known=self.manifest.are_objects_known,
+            )
         except InputError as fault:
             raise InputError(f"{self.path / TRUTH}: {fault}") from None
 

@@ -208,4 +208,6 @@ def _content(
         content |= asdict(counts.readout)
     if truth is not None and truth.unscored:
         content["unscored"] = sorted(truth.unscored)
+    if truth is not None and not truth.are_objects_known:
+        content["are_objects_known"] = False
     return {"identity": hash_json(content), **content}

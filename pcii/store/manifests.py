@@ -123,6 +123,7 @@ class DatasetManifest(Manifest):
     radiance_unit: Text | None = None
     objects: dict[ObjectId, Text] = {}
     unscored: list[ObjectId] = []
+    are_objects_known: bool = True
     analysis: Analysis | None = None
     photon_budget: Photons | None = None
     recipe: Recipe = {}

@@ -18,7 +18,7 @@ def check_cfa(cfa: str | None) -> str | None:
         return cfa
     raise InputError(
         f"cfa: there is no Bayer pattern {cfa!r}; use one of {', '.join(PATTERNS)}, "
-        "or none for a monochrome sensor"
+        "or none (None in Python) for a monochrome sensor"
     )
 
 

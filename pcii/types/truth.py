@@ -34,7 +34,8 @@ class Truth(Drawn):
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
     backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
-    `unscored` are the numbers of objects that count in no score.
+    `unscored` are the numbers of objects that count in no score. Without `are_objects_known` nobody has told
+    what belongs to which object: there is a depth alone, and no mask of objects is right or wrong.
 
     The other maps are None where the dataset lacks them. `normal` (H, W, 3) float32: unit normal of the
     surface in world axes, towards the camera; 0 where nothing is hit. `coverage` (H, W) float32: the share
@@ -50,6 +51,7 @@ class Truth(Drawn):
     coverage: np.ndarray | None = None
     visible_views: np.ndarray | None = None
     unscored: frozenset[int] = frozenset()
+    are_objects_known: bool = True
 
     def __post_init__(self) -> None:
         if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
 from pcii.exchange.pixel_files import UPRIGHT, decode, picture_of
-from simgen.assets.triangles import Triangles, fan_all
+from simgen.assets.triangles import Triangles, triangulate
 from simgen.base.file_lookup import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
 from simgen.base.strict_models import shorten
 
@@ -165,7 +165,8 @@ def _read_ply(data: bytes) -> Triangles:
         raise ValueError("has no vertices with x, y and z")
     lists_name = next((name for name in _FACES if name in (faces.dtype.names or ())), None)
     if lists_name is None or not len(faces):
-        raise ValueError("has no faces")
+        strips = "tristrips" in elements
+        raise ValueError("has strips of triangles; save its faces" if strips else "has no faces")
     lists = faces[lists_name]
     if lists.dtype == object:
         counts, corners = np.array([len(polygon) for polygon in lists]), np.concatenate(list(lists))
@@ -174,7 +175,7 @@ def _read_ply(data: bytes) -> Triangles:
     texcoords = next((pair for names in _TEXCOORDS if (pair := columns(*names)) is not None), None)
     if corners.dtype.kind not in "iu":
         raise ValueError("has a face whose vertex is not a whole number")
-    triangles = fan_all(corners.astype(np.int64), counts)
+    triangles = triangulate(corners.astype(np.int64), counts, positions)
     return Triangles.checked(positions, triangles, columns("nx", "ny", "nz"), texcoords)
 
 
@@ -219,7 +220,7 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
             elif keyword == "usemtl":
                 material = " ".join(words)
             elif keyword == "mtllib":
-                libraries += words
+                libraries.append(line.split(None, 1)[1].strip())
             elif keyword == "vt":
                 u, v = [*words, "0"][:2]  # v may be left out
                 points["vt"].append([float(u), float(v)])
@@ -252,7 +253,7 @@ def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray)
         one[own] if own[0] >= 0 else None for one, own in zip(values, triples[first].T, strict=True)
     )
     assert positions is not None
-    return Triangles.checked(positions, fan_all(vertices.ravel(), counts), normals, uv)
+    return Triangles.checked(positions, triangulate(vertices.ravel(), counts, positions), normals, uv)
 
 
 def _corner(word: str, sizes: list[int]) -> list[int]:

@@ -1,5 +1,1 @@
-"""Where cameras stand and which way their pixels look; disparities.
-
-disparities  What a camera grid does to depth: disparities, whole-pixel shifts, and colours that meet.
-rig          Where cameras really stand and which way their pixels look, from first principles.
-"""
+"""Where cameras stand and which way their pixels look; disparities."""

@@ -22,7 +22,7 @@ from simgen.photons.counting_plan import Plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
-from simgen.spec.lights import AreaLight, SpotLight
+from simgen.spec.lights import AreaLight, EnvironmentLight, SpotLight, UniformLight
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
@@ -208,8 +208,10 @@ def _other_shares(scene: Scene, centre: FirstHits, image: np.ndarray) -> dict[st
     """Shares (C,) of the light in each colour of what is no object, by its name."""
     wall_mm, is_other = math.nan if scene.backdrop is None else scene.backdrop.z_mm, centre.object_id == 0
     is_wall = is_other & np.isclose(centre.z_mm, wall_mm, rtol=1e-5)
-    masks = {"what shines from all around": is_other & np.isinf(centre.z_mm), "the backdrop": is_wall}
-    masks["lamps in view"] = is_other & np.isfinite(centre.z_mm) & ~is_wall
+    masks = {"the backdrop": is_wall, "lamps in view": is_other & np.isfinite(centre.z_mm) & ~is_wall}
+    around = [lamp for lamp in scene.lights if isinstance(lamp, EnvironmentLight | UniformLight)]
+    if scene.mitsuba is not None or any(lamp.visible for lamp in around):  # else it is that of outlines
+        masks = {"what shines from all around": is_other & np.isinf(centre.z_mm), **masks}
     return {name: _share(image[mask].sum(axis=0), image.sum(axis=(0, 1))) for name, mask in masks.items()}
 
 

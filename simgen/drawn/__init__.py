@@ -2,7 +2,4 @@
 
 Each is an entry point of the group `simgen.scenes`, as scenes of other packages are, and a scene is the same
 for all time. Depths, sizes, shapes, colours, textures and lights differ.
-
-composition  What objects of drawn scenes are made of: colours, patterns, shapes.
-kinds        The ten kinds: two or three solids, many cards or leaves, a room, things on a desk.
 """

@@ -101,14 +101,17 @@ class Surface:
         if reason or texture.source is None:
             self._lose(reason)
             return None
+        sampler = Sampler()
+        if texture.sampler is not None:
+            sampler = self.gltf.item(document.samplers, texture.sampler, "samplers")
+        clamps = [side == CLAMP for side in (sampler.wrap_s, sampler.wrap_t)]
         if self.texcoord is None:
-            self.texcoord, self.uv_matrix, sampler = texcoord, uv_matrix, Sampler()
-            if texture.sampler is not None:
-                sampler = self.gltf.item(document.samplers, texture.sampler, "samplers")
-            clamps = [side == CLAMP for side in (sampler.wrap_s, sampler.wrap_t)]
+            self.texcoord, self.uv_matrix = texcoord, uv_matrix
             self.pictures_repeat = not all(clamps)
             if any(clamps) and self.pictures_repeat:
                 self._lose("pictures that are repeated along one side alone: they are along both")
+        elif self.pictures_repeat == all(clamps):
+            self._lose("pictures that are repeated unlike the first: they are as the first is")
         return self.gltf.picture(texture.source)
 
     def _opacity(self, base: np.ndarray | None) -> dict[str, str] | None:

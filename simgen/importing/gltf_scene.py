@@ -50,6 +50,8 @@ class GltfScene(ForeignScene):
         self._surface = cache(partial(Surface, self.gltf, cd_m2_per_emission))
         self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
         self._triangles = 0
+        if (others := len(self.gltf.document.scenes) - 1) > 0:
+            self.lose(f"{others} more scenes of the file")
         self._places = dict(_placed_nodes(self.gltf))
         for index in self._places:
             self._add_node(index)

@@ -21,6 +21,11 @@ GREY = {"reflectance": [0.7, 0.7, 0.7]}
 """Of what has no material, sRGB."""
 Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 """From axes whose Z is up and whose Y goes away to those whose Y is up."""
+COLOURS_OF_VERTICES = {
+    ".obj": re.compile(rb"^v(?:[ \t]+[^\s#]+){6}", re.MULTILINE),
+    ".ply": re.compile(rb"^property \w+ red\b(?=[\s\S]*^end_header)", re.MULTILINE),
+}
+"""How files with them can be told."""
 STL_HEAD_BYTES = 84
 STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -45,13 +50,15 @@ class MeshScene(ForeignScene):
 
     def _read(self) -> Iterator[tuple[str, Triangles, dict[str, Any]]]:
         """Names, meshes and materials of objects; several may have one name."""
-        kind, stem = self.path.suffix.lower(), self.path.stem
+        kind, stem, data = self.path.suffix.lower(), self.path.stem, self.path.read_bytes()
+        if (colour := COLOURS_OF_VERTICES.get(kind)) and re.search(colour, data):
+            self.lose("colours of vertices")
         if kind == ".stl":
-            yield from ((name, mesh, GREY) for name, mesh in _stl_solids(self.path.read_bytes(), stem))
+            yield from ((name, mesh, GREY) for name, mesh in _stl_solids(data, stem))
         elif kind == ".ply":
             yield stem, read_mesh(self.path), GREY
         else:
-            libraries, parts = obj_parts(self.path.read_bytes())
+            libraries, parts = obj_parts(data)
             materials = self._materials(libraries)
             materials_of = Counter(group for group, _ in parts)
             for (group, material), mesh in parts.items():
@@ -83,13 +90,16 @@ class MeshScene(ForeignScene):
                     self.lose(f"pictures of materials ({keyword})")
                 elif keyword in ("Ke", "Tf", "d", "Tr") and {*words} - {"0", "0.0", "1", "1.0"}:
                     self.lose(f"{keyword} of materials")
+                elif keyword in ("Ks", "Ns", "Pr", "Pm") and {*words} - {"0", "0.0"}:
+                    self.lose("gloss of materials (Ks, Ns, Pr, Pm): all are matt")
         return materials
 
 
 def _stl_solids(data: bytes, stem: str) -> Iterator[tuple[str, Triangles]]:
     """Names and meshes of the solids of an STL file; raises `ValueError` with the end of a sentence."""
     count = int.from_bytes(data[STL_HEAD_BYTES - 4 : STL_HEAD_BYTES], "little")
-    if len(data) == STL_HEAD_BYTES + count * STL_FACET.itemsize:
+    ends = STL_HEAD_BYTES + count * STL_FACET.itemsize  # some programs write more behind it
+    if ends == len(data) or (ends < len(data) and not data.lstrip().startswith(b"solid")):
         yield stem, _joined(np.frombuffer(data, STL_FACET, count, STL_HEAD_BYTES)["corners"].reshape(-1, 3))
         return
     text = data.decode("latin-1")

@@ -20,6 +20,28 @@ def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: n
     return np.maximum(_objects_hit(render_scene, origins_mm, direction, np.inf), 0)
 
 
+def first_points(
+    render_scene: RenderScene, origin_mm: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What rays from one origin (3,) in directions (N, 3) hit first: points (N, 3) in mm, infinite for a
+    miss, normals (N, 3) of the surface, and object ids (N,) int16, 0 for none."""
+    rays = _rays(render_scene, np.broadcast_to(origin_mm, direction.shape), direction, np.inf)
+    scene, frame = render_scene.scene, render_scene.frame
+    if is_scalar(render_scene.mi):
+        hits = [scene.ray_intersect(render_scene.mi.RayDifferential3f(ray)) for ray in rays]
+        points = np.array([np.ravel(hit.p) for hit in hits])
+        normals = np.array([np.ravel(hit.n) for hit in hits])
+        is_hit = np.array([hit.is_valid() for hit in hits], dtype=bool)
+        ids = first_objects(render_scene, origin_mm, direction)
+    else:
+        hit = scene.ray_intersect(rays)
+        points, normals, is_hit = np.array(hit.p).T, np.array(hit.n).T, np.array(hit.is_valid(), dtype=bool)
+        shape = np.array(load_drjit().select(hit.is_valid(), shape_number(render_scene, hit), 0))
+        ids = render_scene.object_of_shape[shape]
+    points_mm = np.where(is_hit[:, None], frame.points_mm(points), np.inf)
+    return points_mm, frame.world_directions(normals), ids
+
+
 def standing_before(
     render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
 ) -> np.ndarray:

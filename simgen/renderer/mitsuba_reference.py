@@ -160,11 +160,15 @@ def _parse(mi: Any, path: Path, sensor: str | None = None) -> tuple[Any, Any]:
         mi.set_file_resolver(shipped)
     if _kind(state.root) != "Scene":
         raise InputError(f"{path}: expected a <scene>, not a single plugin")
+
+    def is_kept(node: Any) -> bool:
+        return _kind(node) == "Sensor" and node.props.id() == sensor  # without an id it is ""
+
     for node in state.nodes:
         for key, child in _children(mi, state, node).items():
-            if _kind(child) in OF_RECIPES.values() and child.props.id() != sensor:
+            if _kind(child) in OF_RECIPES.values() and not is_kept(child):
                 del node.props[key]
-        if _kind(node) in (*OF_RECIPES.values(), "Scene") and node.props.id() != sensor:
+        if _kind(node) in (*OF_RECIPES.values(), "Scene") and not is_kept(node):
             continue
         values = _properties(node)
         if fault := _fault(node.props.plugin_name(), values, Path(mi.__file__).parent):

@@ -13,10 +13,15 @@ import numpy as np
 from pcii.base.progress import Report, silent
 from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, Cameras, Rig, as_rig, centre_camera
-from simgen.renderer.intersection import blocked, first_objects
+from simgen.renderer.intersection import blocked, first_objects, first_points
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import sensor_plugin
 
+BESIDE_EDGE_PX = 0.01
+"""Rays so far from a pixel's centre pass beside an edge between triangles that the centre meets exactly: much
+farther than float32 rounds, and less than anything that is worth a pixel."""
+LEAST_STEP = 1e-3
+"""Share of the depth by which a pixel is behind its neighbours before it is looked at again."""
 IN_FOCUS_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
 COVERAGE_SAMPLES = 233
@@ -87,7 +92,38 @@ def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
         object_id = first_objects(render_scene, camera.position_mm, towards).reshape(hit.shape)
     else:
         object_id = render_scene.object_of_shape[shape]
-    return FirstHits(z_mm.astype(np.float32), object_id, facing.astype(np.float32))
+    hits = FirstHits(z_mm.astype(np.float32), object_id.astype(np.int16), facing.astype(np.float32))
+    _mend_edges(render_scene, camera, hits)
+    return hits
+
+
+def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> None:
+    """Put right what rays see that pass between two triangles by rounding, since they meet an edge exactly.
+
+    Such a pixel is behind at least two of its four neighbours. If rays on at least three of four
+    sides, close to its centre, hit something nearer, the centre's ray is taken to hit what is there.
+    """
+    z = np.pad(hits.z_mm, 1, constant_values=np.inf)
+    nearer = hits.z_mm * np.float32(1 - LEAST_STEP)
+    beside = z[1:-1, :-2], z[1:-1, 2:], z[:-2, 1:-1], z[2:, 1:-1]
+    row, col = np.nonzero(np.sum([each < nearer for each in beside], axis=0, dtype=np.uint8) >= 2)
+    if not row.size:
+        return
+    down, right = BESIDE_EDGE_PX * np.array([[-1, -1, 1, 1], [-1, 1, -1, 1]])
+    rays = camera.towards(row[:, None] + down, col[:, None] + right)  # (N, 4, 3)
+    points, normals, ids = first_points(render_scene, camera.position_mm, rays.reshape(-1, 3))
+    depth = points[:, 2].reshape(-1, 4)
+    number = np.argsort(depth, axis=1)[:, 1]  # the second nearest
+    is_nearer = depth < nearer[row, col, None]
+    some = np.flatnonzero(is_nearer.sum(axis=1) >= 3)
+    row, col, chosen = row[some], col[some], 4 * some + number[some]
+    point, normal = points[chosen], normals[chosen]
+    away = point - camera.position_mm
+    normal *= -np.sign((normal * away).sum(axis=1))[:, None]
+    ray = camera.towards(row, col)  # on to the plane of the surface that is hit close by
+    share = (normal * away).sum(axis=1) / (normal * ray).sum(axis=1)
+    hits.z_mm[row, col] = camera.position_mm[2] + share * ray[:, 2]
+    hits.object_id[row, col], hits.normal[row, col] = ids[chosen], normal
 
 
 def over_squares(pick: np.ufunc, values: np.ndarray, side: int) -> np.ndarray:

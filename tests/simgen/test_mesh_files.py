@@ -90,6 +90,27 @@ def test_a_corner_of_an_obj_is_split_where_its_texture_is(tmp_path: Path) -> Non
     np.testing.assert_array_equal(mesh.texcoords[mesh.faces[:, 0]], [[0, 0], [0, 1]])
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_polygons_that_are_not_convex_keep_their_area(axis: int, tmp_path: Path) -> None:
+    turn = np.arange(14) * 2 * np.pi / 14
+    star = np.stack([np.cos(turn), np.sin(turn)], axis=1) * np.where(np.arange(14) % 2, 1, 0.3)[:, None]
+    ell = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]) + 5.0
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 5.0
+    lines, first, area = list[str](), 1, 0.0
+    for flat in (star, ell, square):
+        x, y = flat.T
+        area += abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+        lines += [f"v {' '.join(map(str, point))}" for point in np.insert(flat, axis, 1.0, axis=1)]
+        lines.append("f " + " ".join(str(first + number) for number in range(len(flat))))
+        first += len(flat)
+    mesh = read(tmp_path, "a.obj", "\n".join(lines).encode())
+    a, b, c = np.moveaxis(mesh.positions[mesh.faces].astype(np.float64), 1, 0)
+    normals = np.cross(b - a, c - a)
+    assert len(normals) == 12 + 4 + 2
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(area, rel=1e-5)
+    assert len(np.unique(np.sign(normals[:, axis]))) == 1  # all are seen from one side
+
+
 def test_vertices_without_faces_do_not_count(tmp_path: Path) -> None:
     content = ply("0 0 0\n1 0 0\nnan nan nan\n0 1 0\n", "3 0 1 3\n", vertex_count=4)
     mesh = read(tmp_path, "a.ply", content)

@@ -101,6 +101,25 @@ def test_normals_are_the_surfaces_own_and_face_the_camera(tmp_path: Path) -> Non
     assert slanted.normal.dtype == np.float32
 
 
+def test_no_ray_passes_where_triangles_meet(tmp_path: Path) -> None:
+    """The four edges of a pyramid lie exactly on pixels' centres, in front of its base 60 mm behind."""
+    corners = ["v -60 -60 60", "v 60 -60 60", "v 60 60 60", "v -60 60 60", "v 0 0 0"]
+    faces = ["f 1 3 2", "f 1 4 3", *(f"f {one} {one % 4 + 1} 5" for one in range(1, 5))]
+    (tmp_path / "pyramid.obj").write_text("\n".join(corners + faces))
+    pyramid = {"name": "pyramid", "position_mm": (0, 0, 570), "material": WHITE}
+    of = grid(2, 2, 200, 200)
+    hits = first_hits_at_centre(
+        built(tmp_path, [pyramid | {"shape": {"type": "mesh", "file": "pyramid.obj"}}]), of
+    )
+    slope = np.abs(directions(of)[..., :2]).max(axis=-1)
+    expected = 570 / (1 - slope)  # |x| or |y| deep
+    here = expected < 629
+    np.testing.assert_allclose(hits.z_mm[here], expected[here], rtol=1e-5)
+    assert (hits.object_id[here] == 1).all()
+    towards = (hits.normal * directions(of)).sum(axis=-1)
+    assert (towards[here] < 0).all()
+
+
 def test_the_virtual_centre_of_an_even_grid_stands_between_cameras(tmp_path: Path) -> None:
     scene = built(tmp_path, [card("dot", 500.0, 20.0, WHITE)])
     even = grid(2, 2, 61, 81)

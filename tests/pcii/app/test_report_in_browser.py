@@ -18,12 +18,13 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 
 def test_the_slider_moves_through_the_depths(browser: Page, reports: dict[str, Written]) -> None:
     browser.open(reports["full"].path)
-    first = browser.value(SHOWN)
-    browser.click("#plane")  # the middle
+    assert browser.value(SHOWN) == [browser.text("#depth-shown")]
+    browser.click("#plane")  # between the two in the middle of four
     middle = browser.text("#depth-shown")
-    assert browser.value(SHOWN) == [middle] != first
+    assert browser.value(SHOWN) == [middle]
     browser.press_right()
     after = browser.text("#depth-shown")
+    assert browser.value(SHOWN) == [after]
     assert float(after.split()[0]) > float(middle.split()[0])
     assert browser.value("document.querySelector('#plane').getAttribute('aria-valuetext')") == after
     assert not browser.faults

@@ -224,7 +224,7 @@ def near_plane(data: Any, z_range_mm: tuple[float, float]) -> DepthMap:
 
 def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path: Path) -> None:
     """By one process and by two, which share the work."""
-    methods = [by_count, ("rows", two_rows), ("depth:near", near_plane), "variance"]
+    methods = [by_count, ("rows", two_rows), ("depth:near", near_plane), "brightness"]
     asked: dict[str, Any] = {"methods": methods, "budgets": [OWN]}
     evaluation = evaluate([series], tmp_path / "alone", **asked)
     assert mean_of(evaluation, OWN, "by_count", "iou").mean == pytest.approx(0.85)
@@ -235,7 +235,7 @@ def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path:
     # Nobody knows what they follow from, so they are measured whenever they are named.
     again = evaluate([series], tmp_path / "out", **asked).made_again
     assert again == ("9 scores of by_count, depth:near, rows, since what makes them is not known",)
-    assert evaluate([series], tmp_path / "out", methods=["variance"], budgets=[OWN]).made_again == ()
+    assert evaluate([series], tmp_path / "out", methods=["brightness"], budgets=[OWN]).made_again == ()
 
 
 def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
@@ -261,7 +261,7 @@ def test_a_function_in_a_file_is_measured_again_when_the_file_has_changed(
         ([("three-step", by_count)], "methods: the name 'three-step' is taken"),
         ([("depth:a:b", near_plane)], "methods: expected a name of letters .*, got 'a:b'"),
         ([("(nothing)", by_count)], r"methods: expected a name of letters .*, got '\(nothing\)'"),
-        (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:sweep-9"),
+        (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:sweep-17"),
     ],
 )
 def test_methods_that_cannot_be_compared_are_refused(
@@ -293,7 +293,7 @@ def test_a_run_that_fails_keeps_what_it_measured_and_a_second_one_is_refused(
 
     def breaks(counts: Any, sections: Any) -> Any:
         with pytest.raises(InputError, match="out: another run writes here; wait for its end"):
-            evaluate([series], out, methods=["variance"])
+            evaluate([series], out, methods=["brightness"])
         if counts.total == open_dataset(series / "seed_5").counts.total:
             raise InputError("this photon is one too many")
         return by_count(counts, sections)

@@ -88,14 +88,14 @@ def test_rows_of_other_software_are_measured_again(
 
 def test_the_page_says_what_made_it(tmp_path: Path) -> None:
     data, out = write_dataset(tmp_path / "data", 1, {OWN: 5}), tmp_path / "out"
-    evaluate([data], out, methods=["brightness", "variance"])
+    evaluate([data], out, methods=["brightness", "shape-from-focus"])
     rows = read_rows(out)
     earlier = tmp_path / "earlier"
     with writing_rows(earlier) as file:
         file.add(rows[0] | {"date": "2026-01-10", "software": {"numpy": "1.0"}})
         file.add({name: value for name, value in rows[1].items() if name != "software"})
-    (sentence,) = evaluate([data], earlier, methods=["variance"]).made_again
-    assert sentence == "1 scores of variance, since what makes them is not known"
+    (sentence,) = evaluate([data], earlier, methods=["shape-from-focus"]).made_again
+    assert sentence == "1 scores of shape-from-focus, since what makes them is not known"
     page = html.unescape((earlier / "evaluation.html").read_text())
     digest = hashlib.sha256((earlier / "rows.jsonl").read_bytes()).hexdigest()
     for text in ("2026-01-10 to 20", machine(), digest, f"{version('numpy')} (1 rows); 1.0 (1 rows)"):

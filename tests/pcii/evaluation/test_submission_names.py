@@ -35,7 +35,7 @@ OF_OTHERS = [
     *(f"my{letter}net" for letter in [*UNSEEN, "  ", "\xa0", "\n", "\0"]),
     *(" net", "net ", "\uff4eet", "ne\u0301t", "\U0001d427et", "\ufb01ne", "my\u2010net"),
     *("n\u0435t", "\u03bdet", "net\u0338"),  # Cyrillic, Greek, a mark that overlays
-    *("Variance", "VARIANCE", "Sweep-9", "structure-tensor", "Depth"),
+    *("Brightness", "BRIGHTNESS", "Sweep-17", "structure-tensor", "Depth"),
     *("depth:net", "depth:depth:net", "depth:", "my_module:net", "depth\u2236net"),
 ]
 

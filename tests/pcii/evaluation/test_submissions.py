@@ -32,7 +32,7 @@ def data(small_benchmark: Path) -> BenchmarkHalf:
 
 @pytest.fixture(scope="module")
 def submitted(data: BenchmarkHalf, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The masks by "variance" and the depth by "variance-sweep" as somebody else would send them."""
+    """The masks by "brightness" and the depth by "variance-sweep" as somebody else would send them."""
     folder = tmp_path_factory.mktemp("submitted")
     (folder / SUBMISSION).write_text(json.dumps({"benchmark": "small", "method": "mine", "authors": "A. N."}))
     for dataset in data.datasets:
@@ -44,7 +44,7 @@ def submitted(data: BenchmarkHalf, tmp_path_factory: pytest.TempPathFactory) -> 
             depth = pcii.estimate_depth(chosen.counts_or_views, z_range_mm, method="variance-sweep")
             np.savez(inside / "depth.npz", z_mm=depth.z_mm, confidence=depth.confidence)
             if dataset.has_counts:
-                focus = pcii.segment(chosen.counts, dataset.analysis["z_mm"], method="variance")
+                focus = pcii.segment(chosen.counts, dataset.analysis["z_mm"], method="brightness")
                 np.savez(inside / "masks.npz", in_focus=focus.in_focus)
     return folder
 
@@ -58,14 +58,14 @@ def test_maps_made_elsewhere_score_as_the_method_that_made_them(
     data: BenchmarkHalf, scored: Evaluation, tmp_path: Path
 ) -> None:
     given = scored.frame
-    for method, name in (("variance", "mine"), ("depth:variance-sweep", "depth:mine")):
+    for method, name in (("brightness", "mine"), ("depth:variance-sweep", "depth:mine")):
         run = run_method(method, data, tmp_path / method.replace(":", "-")).frame
         own = given[given["method"] == name].reset_index(drop=True)
         keys = ["identity", "light", "z_mm"]
         one, other = (table.sort_values(keys, ignore_index=True) for table in (run, own))
         assert one["dataset"].tolist() == other["dataset"].tolist()
         assert set(one["scene"]) == {"pair", "pair, binary frames"}
-        columns = [*keys, "iou" if method == "variance" else "within_1px", "photons_per_view"]
+        columns = [*keys, "iou" if method == "brightness" else "within_1px", "photons_per_view"]
         pd.testing.assert_frame_equal(one[columns], other[columns], check_categorical=False)
         assert other["seconds"].isna().all()
     assert own["light"].cat.categories.tolist() == [30.0, 1000.0, 3000.0, "full-light"]
@@ -117,7 +117,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     shutil.copytree(scored.folder, folder / "theirs")
     about = {"authors": "B. C.", "url": None, "trained_on": "drawn scenes"}
     run_method("depth:posterior", data, folder / "ours", **about)
-    edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "a; b')(folder / "ours")
+    edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "net:a; b')(folder / "ours")
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()
     assert "small: methods compared" in text
@@ -125,12 +125,12 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     for words in ("mine", "depth:mine", "depth:posterior", *bounds, "B. C.", "drawn scenes"):
         assert f">{words}</td>" in text
     assert "pcii benchmark score MAPS --data BENCHMARK --half development -o submissions/theirs" in text
-    assert "pcii benchmark run &#39;a; b&#39; --data" in text  # as one word of a shell
+    assert "pcii benchmark run &#39;net:a; b&#39; --data" in text  # as one word of a shell
     shutil.copytree(folder / "ours", folder / "again")
     with pytest.raises(InputError, match="again and ours are both of 'depth:posterior'"):
         write_page(folder, out)
     with pytest.raises(InputError, match="theirs: holds scores of 'depth:mine'; name another folder"):
-        run_method("variance", data, folder / "theirs")
+        run_method("brightness", data, folder / "theirs")
     assert out.read_text() == text
 
 
@@ -173,7 +173,9 @@ def test_an_unfinished_benchmark_names_the_command_that_goes_on(
     assert f"{part}: 3 of 5 datasets of the {HALF} half are missing" in said
     assert f"`simgen benchmark make -o {part}` goes on with it" in said
     (part / INDEX).unlink()
-    with pytest.raises(InputError, match=r"unfinished; `simgen benchmark make -o .*` goes on with it"):
+    with pytest.raises(
+        InputError, match=r"unfinished; the same `simgen benchmark make -o .*` goes on with it"
+    ):
         open_benchmark(part, HALF)
 
 

@@ -36,7 +36,7 @@ IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
 OF_COUNTS = [
     "depth:posterior",
-    *(f"depth:sweep-{width}" for width in (9, 17, 33)),
+    "depth:sweep-17",
     "depth:variance-sweep",
 ]
 FULL_LIGHT = "full-light"
@@ -64,9 +64,9 @@ def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Pat
         *(("nested", budget, name) for budget in (NESTED, OWN) for name in of_counts),
     ]
     # Of what is named each method takes what it can.
-    assert chosen([both], "depth:variance-sweep", "variance") == [
+    assert chosen([both], "depth:variance-sweep", "brightness") == [
         ("both", None, "depth:variance-sweep"),
-        ("both", None, "variance"),
+        ("both", None, "brightness"),
         ("both", FULL_LIGHT, "depth:variance-sweep"),
     ]
     assert chosen([nested], "depth", lights=[Light(20)]) == [("nested", NESTED, "depth:posterior")]
@@ -129,7 +129,7 @@ def test_depths_that_are_missing_or_too_near(tmp_path: Path) -> None:
     ranged = saved(tmp_path / "ranged", COUNTS, z_range_mm=(450, 800))
     assert chosen([ranged]) == [("ranged", None, name) for name in OF_COUNTS]
     with pytest.raises(InputError, match="suggests no depths"):
-        chosen([ranged], "variance")
+        chosen([ranged], "brightness")
     near = saved(tmp_path / "near", COUNTS, z_mm=[500], z_range_mm=(0.5, 800))
     with pytest.raises(InputError, match=r"near: z_range_mm: from .* choose a farther near end"):
         chosen([near], "depth")
@@ -137,7 +137,7 @@ def test_depths_that_are_missing_or_too_near(tmp_path: Path) -> None:
 
 def test_the_bound_of_an_objects_depth_stands_beside_it_where_there_is_radiance(tmp_path: Path) -> None:
     both, dark = saved(tmp_path / "both", (COUNTS, LIGHT)), saved(tmp_path / "dark", COUNTS)
-    frame = evaluate([both.path, dark.path], tmp_path / "out", methods=["depth", "variance"]).frame
+    frame = evaluate([both.path, dark.path], tmp_path / "out", methods=["depth", "brightness"]).frame
     z_mm = [500, 700]
     (expected,) = object_bounds(TRUTH, reconstruct(LIGHT, z_mm), reconstruct(COUNTS, z_mm))
     assert expected["depth_sigma_px"] > 0

@@ -1,6 +1,7 @@
 """Frames as sensors keep them: what they are is said or recognised, and what looks wrong is named."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +127,9 @@ def test_files_without_a_header(tmp_path: Path, stored: FrameFormat, number: str
         told_of(tmp_path, pattern="{row}_{col}.bin", stored=stored)
 
 
+LACKS_A_FRAME = "frame 7 of the view row 1, col 0 is missing; others have it"
+
+
 def test_a_folder_of_frames_for_each_view(tmp_path: Path, capsys: Any) -> None:
     for k, l, t in np.ndindex(2, 2, FRAMES):
         (tmp_path / "in" / f"{k}_{l}").mkdir(parents=True, exist_ok=True)
@@ -138,7 +142,7 @@ def test_a_folder_of_frames_for_each_view(tmp_path: Path, capsys: Any) -> None:
     assert run(*command, "-o", tmp_path / "other") == 2
     assert "{frame} is for frames of photon counts; give --counts too" in capsys.readouterr().err
     (tmp_path / "in" / "1_0" / "0007.png").unlink()
-    check_refused(tmp_path / "in", tmp_path / "x", [*command[2:], "--counts"], "1_0/0000.png: has fr", capsys)
+    check_refused(tmp_path / "in", tmp_path / "x", [*command[2:], "--counts"], LACKS_A_FRAME, capsys)
 
 
 def test_a_cube_in_three_channels_is_a_mosaic(tmp_path: Path, capsys: Any) -> None:
@@ -187,8 +191,28 @@ def test_marks_are_named_and_a_mask_leaves_them_out(tmp_path: Path) -> None:
         counts, told = told_of(stored, stored=FrameFormat(mask=tmp_path / name))
         np.testing.assert_array_equal(counts.dense, np.where(dead, 0, clean))
         assert told[-1] == "33 pixels of --mask count nothing"
+    for marked in (np.where(dead, -1, clean.astype(np.int32)), np.where(dead, np.nan, clean)):
+        counts, _ = told_of(marked, stored=FrameFormat(mask=tmp_path / "dead.npy"))
+        np.testing.assert_array_equal(counts.dense, np.where(dead, 0, clean))
     with pytest.raises(InputError, match=r"--mask: .* is \(32, 32\), and views are \(12, 32\)"):
         told_of(BITS, stored=FrameFormat(mask=tmp_path / "dead.npy"))
+
+
+def test_numbers_that_are_stored_otherwise_are_named() -> None:
+    counts = np.random.default_rng(9).poisson(3.0, (2, 2, 3, 40, 50)).astype(np.uint16)
+    for stored, bits, words in (
+        (
+            counts.byteswap(),
+            12,
+            "multiples of 256; .*; if the bytes of each number are in the other order, swap",
+        ),
+        (counts.clip(max=15) << 4, 8, "multiples of 16; if that is one photon, give --gain 16$"),
+        (counts.clip(max=1) * 255, None, "multiples of 255; if that is one photon, give --gain 255$"),
+        (counts.clip(max=3), None, "of the numbers of array are 3, more than are 2: .* give --bits 2$"),
+    ):
+        _, (sentence,) = told_of(stored, stored=FrameFormat(bits=bits))
+        assert re.search(words, sentence), sentence
+    assert told_of(counts.clip(max=3), stored=FrameFormat(bits=2))[1] == []
 
 
 @pytest.mark.parametrize("mean", [0.01, 0.3, 3, 40, 1000])
@@ -260,6 +284,11 @@ def test_frames_and_colours_have_axes_of_their_own() -> None:
     ("shape", "axes", "words"),
     [
         ((40, 48, 5, 5), None, "would be more views than each has numbers; name the order .* such as HWKL"),
+        (
+            (40, 48, 5, 3, 3),
+            None,
+            "would be more views than each has numbers; name the order .* such as HWKL",
+        ),
         ((40, 48, 3, 3), "HWK", "--axes: expected each axis once, K and L"),
         ((40, 48, 3, 3), "HWKK", "--axes: expected each axis once"),
         ((40, 48, 3), "HWKL", r"has the shape \(40, 48, 3\), and --axes HWKL are 4 axes"),

@@ -10,7 +10,7 @@ import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
 
-from pcii import import_images
+from pcii import InputError, import_arrays, import_images
 from pcii.base.srgb import srgb_to_linear
 
 PATTERN = "{col}_{row}.%s"
@@ -139,4 +139,16 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     told: list[str] = []
     for profile in ("srgb", "other"):
         import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
-    assert [one for one in told if "profile" in one] == ["not used: the colour profile in 0_0.other.png"]
+    linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
+    first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
+    import_images(tmp_path, "{col}_{row}.gimp.png", OPTICS, tell=told.append)
+    named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
+    assert [one for one in told if "profile" in one] == named
+    raw = np.full((H, W), 500, np.uint16)
+    tags = [(33422, "B", 4, b"\x02\x01\x01\x00", False), (50714, "H", 1, 256, False)]
+    tifffile.imwrite(tmp_path / "0_0.tif", raw, extratags=tags)
+    import_images(tmp_path, "{col}_{row}.tif", OPTICS, tell=told.append)
+    assert told[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
+    np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
+    with pytest.raises(InputError, match="holds numbers up to 255; encoded light is 1 at white"):
+        import_arrays(tmp_path / "0_0.npy", OPTICS, encoding="srgb")

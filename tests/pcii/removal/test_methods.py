@@ -14,7 +14,7 @@ from pcii.types.focal_planes import FocalPlanes
 from pcii.types.photon_counts import PhotonCounts
 
 ABLE = ["three-step", "posterior"]
-methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "variance", "shape-from-focus"])
+methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "shape-from-focus"])
 able = pytest.mark.parametrize("method", ABLE)
 
 # The outline is found on windows of 5 px, so allow it to be 3 px off all along a square of 72 px.
