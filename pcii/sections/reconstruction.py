@@ -178,12 +178,6 @@ def _count_variance(
     return (samples * squares - sums.astype(np.int64) ** 2) / np.maximum(samples * (samples - 1), 1)
 
 
-def view_coverage(planes: FocalPlanes) -> np.ndarray:
-    """Number of views that reach each voxel of each plane, (Z, H, W)."""
-    shape = (len(planes), planes.grid.height, planes.grid.width, 1)
-    return _coverage(planes, None, shape, *planes.voxel_indices())[..., 0]
-
-
 def _coverage(
     planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:

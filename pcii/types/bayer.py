@@ -41,15 +41,6 @@ def colour_cells(cfa: str | None) -> np.ndarray:
     return np.array([COLOURS.index(letter) for letter in cfa], dtype=np.int64).reshape(2, 2)
 
 
-def sites_of_colours(cfa: str | None) -> np.ndarray:
-    """How many of the 2 x 2 cells are of each colour, (C,) float64.
-
-    >>> sites_of_colours("GRBG").tolist()
-    [1.0, 2.0, 1.0]
-    """
-    return np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa)).astype(np.float64)
-
-
 def colour_index(height: int, width: int, cfa: str | None) -> np.ndarray:
     """Colour that each pixel records, shape (height, width), uint8; 0, 1, 2 = R, G, B."""
     cells = colour_cells(cfa).astype(np.uint8)
