@@ -65,10 +65,8 @@ def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
     if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
-    recipe, goes_on = (
-        read_collection(path).recipe,
-        f"the same `simgen benchmark make -o {path}` goes on with it",
-    )
+    recipe = read_collection(path).recipe
+    goes_on = f"the same `simgen benchmark make -o {path}` goes on with it"
     if not (path / INDEX).is_file():
         raise InputError(f"{path}: the benchmark is unfinished; {goes_on}")
     collection = open_collection(path)

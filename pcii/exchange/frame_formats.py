@@ -178,14 +178,14 @@ def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, tell: Te
         return
     most = np.iinfo(stored.dtype).max
     marks = int(np.count_nonzero(stored == most))
-    if not marks:
-        _warn_of_full_frames(name, stored, tell)
     if marks:
         bits = 8 * stored.dtype.itemsize
         advice = "give --mask FILE if that marks dead pixels"
         advice += f", or --bits {bits} if they are saturated" if bits <= MOST_BITS else ""
         tell(f"warning: {marks} numbers of {name} are {most}: {advice}")
         stored = stored[stored != most]
+    else:
+        _warn_of_full_frames(name, stored, tell)
     if np.count_nonzero(stored) < MIN_JUDGED:
         return
     if stored.dtype == np.uint8:
@@ -211,7 +211,7 @@ def _warn_of_full_frames(name: str, stored: np.ndarray, tell: Tell) -> None:
     if top < 3 or top & (top + 1):
         return
     full, next_to_it = (int(np.count_nonzero(stored == value)) for value in (top, top - 1))
-    if full > 2 * next_to_it + SURE_NATS:
+    if full > 2 * next_to_it + MIN_JUDGED:
         tell(
             f"warning: {full / stored.size:.2g} of the numbers of {name} are {top}, more than are {top - 1}: "
             f"if frames are full there, give --bits {top.bit_length()}"

@@ -19,6 +19,8 @@ SOFTWARE = (
     f"({PROJECT}). The photon-integral-imaging authors."
 )
 """How to cite the software that made the data, as CITATION.cff has it."""
+MOST_NAMED = 3
+"""Largest number of scenes in the title of a collection without one."""
 INSTALL = f"import pcii  # pip install {PROJECT}"
 """A README.md without this line is somebody else's."""
 TEXT = """# {title}
@@ -77,8 +79,9 @@ def write_card(root: Path, terms: Terms) -> None:
     """
     if is_collection(root):
         collection, rows = read_collection(root), read_index(root)
-        scenes = ", ".join(dict.fromkeys(str(row["scene"]) for row in rows))
-        title = str(collection.recipe.get("title") or scenes or "Integral images")
+        scenes = list(dict.fromkeys(row["scene"] for row in rows if row["scene"]))
+        names = ", ".join(scenes) if len(scenes) <= MOST_NAMED else f"{len(scenes)} scenes"
+        title = str(collection.recipe.get("title") or names or "Integral images")
         example = 'dataset = pcii.open_collection("FOLDER")[0]'
         fields = in_markdown(", ".join(collection.fields))
         content = f"A collection of {len(rows)} datasets, which differ in {fields}."

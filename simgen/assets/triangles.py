@@ -137,7 +137,7 @@ def _cut_ears(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
         flat = flat[:, ::-1]
     left, ears = list(range(len(points))), list[list[int]]()
     while len(left) > 3:
-        trio = left[:3]
+        trio = left[:3]  # edges that cross each other leave no ear: any three will do
         for place in range(len(left)):
             trio = [left[place - 1], left[place], left[(place + 1) % len(left)]]
             a, b, c = flat[trio]

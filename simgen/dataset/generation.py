@@ -131,8 +131,9 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
             "skipped": _skipped(prepared, photons, traced_for_visibility(out), render_scene),
             "timings_s": timings_s,
             "files": files,
-            "packed": packed,
         }
+        if packed:
+            manifest["packed"] = packed
         write_manifest(out, manifest)
         marker.unlink()
     return read_written_manifest(out)
