@@ -1,6 +1,7 @@
 """The import rules of the design, kept by reading the source."""
 
 import ast
+import re
 import subprocess
 import sys
 from functools import cache
@@ -191,6 +192,14 @@ def test_rooms_are_neither_crowded_nor_empty_and_say_what_they_are_for(package: 
         assert len(files) <= MOST_FILES, room
         assert len(files) >= FEWEST_FILES, room
         assert ast.get_docstring(ast.parse((folder / "__init__.py").read_text())), room
+
+
+def test_the_page_has_the_rooms_in_their_order() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    for package, rooms in ROOMS.items():
+        (part,) = re.findall(rf"^{package}/ .*\n((?:  .*\n)+)", text, re.MULTILINE)
+        listed = [name for line in part.splitlines() for name in re.findall(r"\w+", line[2:18])]
+        assert listed == [room for room in rooms if "." not in room]
 
 
 def test_files_are_short() -> None:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.recfunctions import unstructured_to_structured
-from plyfile import PlyData, PlyElement, PlyElementParseError
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
@@ -21,6 +20,7 @@ from pcii.base.srgb import srgb_to_linear
 from pcii.exchange.pixel_files import UPRIGHT, decode, picture_of
 from simgen.assets.triangles import Triangles, triangulate
 from simgen.base.file_lookup import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
+from simgen.base.rendering_packages import not_installed
 from simgen.base.strict_models import shorten
 
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -140,8 +140,9 @@ def ply_bytes(mesh: Triangles) -> bytes:
     faces = np.empty(len(mesh.faces), [("vertex_indices", "<i4", (3,))])
     faces["vertex_indices"] = mesh.faces
     file = io.BytesIO()
-    elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
-    PlyData(elements, byte_order="<").write(file)
+    ply = _plyfile()
+    elements = [ply.PlyElement.describe(vertices, "vertex"), ply.PlyElement.describe(faces, "face")]
+    ply.PlyData(elements, byte_order="<").write(file)
     return file.getvalue()
 
 
@@ -179,14 +180,23 @@ def _read_ply(data: bytes) -> Triangles:
     return Triangles.checked(positions, triangles, columns("nx", "ny", "nz"), texcoords)
 
 
-def _parsed_ply(data: bytes) -> PlyData:
+def _plyfile() -> Any:
+    try:
+        import plyfile
+    except ModuleNotFoundError:
+        raise not_installed(["plyfile"]) from None
+    return plyfile
+
+
+def _parsed_ply(data: bytes) -> Any:
     """Faces are read all at once if they are triangles, as most are."""
+    ply = _plyfile()
     header = data[: data.find(b"end_header")]
     name = next((name for name in _FACES if name.encode() in header), _FACES[0])
     if b"format ascii" not in header:
-        with contextlib.suppress(PlyElementParseError):  # other polygons, or a broken file
-            return PlyData.read(io.BytesIO(data), known_list_len={"face": {name: 3}})
-    return PlyData.read(io.BytesIO(data))
+        with contextlib.suppress(ply.PlyElementParseError):  # other polygons, or a broken file
+            return ply.PlyData.read(io.BytesIO(data), known_list_len={"face": {name: 3}})
+    return ply.PlyData.read(io.BytesIO(data))
 
 
 def _read_obj(data: bytes) -> Triangles:

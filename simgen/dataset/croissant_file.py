@@ -13,25 +13,18 @@ from pcii.store.dataset_card import Terms
 from pcii.store.dataset_layout import MANIFEST, RADIANCE
 from pcii.store.folders import hash_file
 
-TERMS = (
-    "citeAs column equivalentProperty extract field fileProperty fileObject fileSet format includes key md5 "
-    "isLiveDataset jsonPath parentField path recordSet references regex repeated replace samplingRate "
-    "separator source subField transform"
-)
+TERMS = "citeAs", "extract", "field", "fileSet", "includes", "jsonPath", "recordSet", "source"
 CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",
     "sc": "https://schema.org/",
     "cr": "http://mlcommons.org/croissant/",
-    "rai": "http://mlcommons.org/croissant/RAI/",
     "dct": "http://purl.org/dc/terms/",
     "conformsTo": "dct:conformsTo",
-    "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-    **{term: f"cr:{term}" for term in TERMS.split()},
+    **{term: f"cr:{term}" for term in TERMS},
 }
-"""The context that the format prescribes, as its validator compares it."""
+"""Of the context that the format prescribes what is used here."""
 FIELDS = {
     "title": ("sc:Text", "$.title"),
     "scene": ("sc:Text", "$.recipe.scene"),

@@ -28,6 +28,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.executor import threads_of_worker
 from simgen.base.file_lookup import cached
+from simgen.base.rendering_packages import not_installed
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 LIBRARY_FOLDERS = ("usr/lib", "usr/lib64", "usr/local/lib", "usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib")
@@ -244,10 +245,7 @@ def _candidates(request: str = "") -> Iterator[Backend]:
     """The backends of this machine, or those of one kind, each tried, best first."""
     missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
     if missing:
-        raise InputError(
-            f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
-            "pip install '.[render]'"
-        )
+        raise not_installed(missing)
     if request in ("", "cuda") and (driver := cuda_driver()):
         yield _trial("cuda", driver, "CUDA")
     for path in _llvm_libraries() if request in ("", "llvm") else ():

@@ -16,6 +16,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, linear_to_srgb
 from simgen.base.file_lookup import cached
+from simgen.base.rendering_packages import not_installed
 from simgen.base.strict_models import suggestion
 
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
@@ -152,7 +153,9 @@ def linear_srgb(reflectance: np.ndarray) -> np.ndarray:
 def colour_science() -> Any:
     """colour-science, which takes a second to load and leaves its own way of printing numbers."""
     options = np.get_printoptions()
-    import colour
-
+    try:
+        import colour
+    except ModuleNotFoundError:
+        raise not_installed(["colour-science"]) from None
     np.set_printoptions(**options)
     return colour
