@@ -285,6 +285,12 @@ def import_lens_array(
     across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
     down = _starts(lenses.rows, lenses.pitch_px[1], lenses.offset_px[1], height, "high", path)
     size = math.floor(lenses.pitch_px[1]), math.floor(lenses.pitch_px[0])
+    beyond = [
+        int((width - across[-1]) / lenses.pitch_px[0]) - 1,
+        int((height - down[-1]) / lenses.pitch_px[1]) - 1,
+    ]
+    if max(beyond) > 0:
+        tell(f"not used: room for {beyond[0]} more columns and {beyond[1]} more rows of lens images")
     starts_evenly = not (np.concatenate([across, down]) % 2).any()
     if cfa is not None and channels == 1 and (lenses.inverted or not starts_evenly):
         raise InputError(

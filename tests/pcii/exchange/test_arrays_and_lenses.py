@@ -128,10 +128,13 @@ def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path,
     path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
     optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)
     lenses = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=inverted)
-    found = import_lens_array(path, lenses, optics)
+    found = import_lens_array(path, lenses, optics, tell=pytest.fail)
     assert found.grid == GRID
     np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
     assert check_grid(found, (15, 100)).order is None
+    told: list[str] = []
+    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, tell=told.append)
+    assert told == ["not used: room for 2 more columns and 1 more rows of lens images"]
     mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
     wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))
     assert wrong.order == ViewOrder(flip_rows=True, flip_cols=True)
