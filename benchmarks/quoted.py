@@ -45,8 +45,6 @@ class Cell(NamedTuple):
 
 
 PAPER, SECTIONS = "Photon counts of the paper's recipe", "Sections at the paper's size"
-CHART = "Nikon 5100 (NPL)", "Raw channels: mean error over patches and channels"
-COLLECTIONS = "Time of each dataset of a collection"
 RATIO = "thinning against dense with 16 samples, the paper's recipe"
 CELLS = {
     "photons.paper_ms": Cell("photon-costs", "thinning, 1000 photons per view", PAPER, "time_ms"),
@@ -54,9 +52,6 @@ CELLS = {
     "sections.events_ms": Cell("section-growth", "events", SECTIONS, "time_ms"),
     "sections.dense_ms": Cell("section-growth", "dense, mean", SECTIONS, "time_ms"),
     "sections.against_opencv": Cell("section-growth", "events against OpenCV, bilinear"),
-    "colour.spectral_percent": Cell("colour", *CHART, "spectral_mode_percent", {"lamp": "A"}),
-    "colour.rgb_percent": Cell("colour", *CHART, "rgb_mode_percent", {"lamp": "A"}),
-    "collections.dataset_ms": Cell("collections", "made", COLLECTIONS, "time_ms", {"datasets": 40}),
 }
 """Figures of studies by name."""
 

@@ -5,19 +5,13 @@ photon_costs      What a photon costs at the paper's size, and how that grows.
 radiance_images   Renderings by samples, lengths of paths, modes of the renderer, and a denoiser.
 sections          Errors of sections of a known texture, ours and other packages'.
 section_growth    Time of sections at the paper's size, and how that grows.
-demosaicing       Errors of colours.
 depth_and_focus   Depth and removal by every method over photon budgets.
 skips             Work that is skipped: on against off.
 end_to_end        From a recipe to a report, beside a plain script.
-colour            Colours of a chart in spectral and RGB mode.
-dataset_overhead  What a dataset of a collection costs beside its light.
 """
 
 from benchmarks.results import Study
 from benchmarks.studies import (
-    colour,
-    dataset_overhead,
-    demosaicing,
     depth_and_focus,
     end_to_end,
     photon_costs,
@@ -34,10 +28,7 @@ STUDIES: tuple[Study, ...] = (
     radiance_images.STUDY,
     sections.STUDY,
     section_growth.STUDY,
-    demosaicing.STUDY,
     depth_and_focus.STUDY,
     skips.STUDY,
     end_to_end.STUDY,
-    colour.STUDY,
-    dataset_overhead.STUDY,
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.photon_distance import Rates, distances
-from benchmarks.studies import demosaicing, radiance_images, sections, skips
+from benchmarks.studies import radiance_images, sections, skips
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
 BUDGET = 5.0 * 64**2
@@ -53,13 +53,6 @@ def test_errors_of_sections_are_relative_to_the_contrast() -> None:
     told = sections.errors(found, truth, 8)
     assert told["rmse_percent"].value == pytest.approx(20)
     assert told["covered_percent"].value == pytest.approx(100 * (1 - 1 / 48**2))
-
-
-def test_errors_of_colours_by_hand() -> None:
-    truth = np.full((16, 16, 3), 0.5)
-    told = demosaicing.errors(truth + 0.1, truth)
-    assert told["cpsnr_db"].value == pytest.approx(20)
-    assert demosaicing.errors(truth, truth)["ciede2000"].value == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("black_rows", [0, 500])
