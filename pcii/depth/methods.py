@@ -127,7 +127,7 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     Raises `InputError` for a registered name that is already taken or no file name.
 
     >>> depth_methods()
-    ('posterior', 'sweep-9', 'sweep-17', 'sweep-33', 'variance-sweep', 'structure-tensor')
+    ('posterior', 'sweep-17', 'variance-sweep', 'structure-tensor')
     """
     return REGISTRY.names(_built_in(data))
 
