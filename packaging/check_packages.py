@@ -91,14 +91,15 @@ def check_analysis(clean: Environment) -> None:
     clean.run("pcii", "sample", "-o", "sample")
     clean.run("pcii", "run", "sample", "-o", "results", "--method", "brightness")
     assert "files match" in clean.run("pcii", "verify", "results")
-    assert "two_objects" in clean.run("simgen", "scenes")
-    said = clean.run("simgen", "generate", "sample", "-o", "made", code=2)
-    assert "[render]" in said, said
+    for words in (["scenes"], ["generate", "sample", "-o", "made"]):
+        said = clean.run("simgen", *words, code=2)
+        assert "[render]" in said, said
 
 
 def check_rendering(clean: Environment) -> None:
     """With the renderer: a scene and a recipe to start from, and the dataset of the recipe."""
     clean.run("simgen", "doctor")
+    assert "two_objects" in clean.run("simgen", "scenes")
     clean.run("simgen", "new-scene", "mine", "--from", "two_objects")
     clean.run("simgen", "new-recipe", "mine")
     smaller = [word for value in ("grid.height=64", "grid.width=96") for word in ("--set", value)]

@@ -32,7 +32,9 @@ def scenes() -> None:
         simgen scenes
     """
     from simgen.app.starting_points import list_recipes, list_scenes
+    from simgen.base.rendering_packages import check_installed
 
+    check_installed()  # or else some scenes would be listed as not valid
     for line in (*list_scenes(), "", "Recipes, of which `simgen generate` makes datasets:", *list_recipes()):
         say(line)
     say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")

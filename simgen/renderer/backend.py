@@ -8,7 +8,6 @@ llvm or scalar allows only one. Answers are cached under a key that changes with
 
 import contextlib
 import ctypes.util
-import importlib.util
 import os
 import platform
 import re
@@ -28,7 +27,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.executor import threads_of_worker
 from simgen.base.file_lookup import cached
-from simgen.base.rendering_packages import not_installed
+from simgen.base.rendering_packages import check_installed
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 LIBRARY_FOLDERS = ("usr/lib", "usr/lib64", "usr/local/lib", "usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib")
@@ -243,9 +242,7 @@ def cuda_driver() -> str | None:
 
 def _candidates(request: str = "") -> Iterator[Backend]:
     """The backends of this machine, or those of one kind, each tried, best first."""
-    missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise not_installed(missing)
+    check_installed()
     if request in ("", "cuda") and (driver := cuda_driver()):
         yield _trial("cuda", driver, "CUDA")
     for path in _llvm_libraries() if request in ("", "llvm") else ():

@@ -7,7 +7,7 @@ its integral with the CIE luminosity function, divided by that function's integr
 
 import warnings
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,10 @@ def measured(table: Any, *, outside: float | None = None) -> np.ndarray:
 @cache
 def _standard() -> dict[str, dict[str, np.ndarray]]:
     """Spectra at `WAVELENGTH_NM` by kind and name; kept on the machine, since colour takes long to load."""
-    depends_on = version("colour-science"), version("scipy"), Path(__file__).read_text()
+    try:
+        depends_on = version("colour-science"), version("scipy"), Path(__file__).read_text()
+    except PackageNotFoundError:
+        raise not_installed(["colour-science"]) from None
 
     def as_arrays(values: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
         return {kind: {name: np.array(values[kind][name]) for name in values[kind]} for kind in KINDS}
