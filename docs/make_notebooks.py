@@ -35,6 +35,7 @@ def run(notebook: NotebookNode) -> None:
         tempfile.TemporaryDirectory() as folder,
         contextlib.chdir(folder),
     ):
+        pyplot.close("all")  # what is open is no cell's
         for number, cell in enumerate(cells, start=1):
             cell.execution_count = number
             cell.outputs = outputs_of(cell.source, number, names)
