@@ -7,6 +7,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
+from pcii.app.report_tables import right_share, three_digits
 from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
@@ -28,7 +29,7 @@ from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
+from pcii.types.geometry import depth_of_total_disparity_mm
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.photon_limit import limit_photons
@@ -184,12 +185,8 @@ def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, tell: Tell) -> tup
         return ()
     depths_mm, sure = find_surfaces(images, z_range)
     if depths_mm:
-        names, farthest_mm = ", ".join(map(_three_digits, depths_mm)), max(depths_mm)
-        grid = images.grid
-        total_px = total_disparity_px(grid, np.array(farthest_mm))
-        px_mm = float(depth_of_total_disparity_mm(grid, total_px - 1)) - farthest_mm
-        within = f"1 px of total disparity, {px_mm:.2g} mm at {_three_digits(farthest_mm)} mm"
-        tell(f"the depth map has most surfaces at {names} mm; {sure:.0%} of its depths are right to {within}")
+        names = ", ".join(map(three_digits, depths_mm))
+        tell(f"the depth map has most surfaces at {names} mm; {right_share(images.grid, depths_mm, sure)}")
     return depths_mm
 
 
@@ -215,7 +212,7 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
         x, y = fit.shear_px
         return f"things are sharp at disparities below 0; add a shift to --shear-px, such as {x:g} {y:g}"
     if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
-        where = f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm, all outside of --z-range-mm"
+        where = f"sharpest at {', '.join(map(three_digits, fit.z_mm))} mm, all outside of --z-range-mm"
         return f"{where}; correct the range, --pitch-mm, --focal-mm or the size of pixels"
     return None
 
@@ -223,17 +220,12 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
 def _say_depths(fit: CameraFit, *, is_counted: bool) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
     if fit.z_mm:
-        say(f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm")
+        say(f"sharpest at {', '.join(map(three_digits, fit.z_mm))} mm")
     elif fit.nearest_mm is None:
         say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
     else:
         say(
-            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; "
+            f"nothing is clearly sharp from {three_digits(fit.nearest_mm)} mm to infinity; "
             f"{'in little light --z-range-mm finds more; else ' if is_counted else ''}correct the order of "
             "views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
         )
-
-
-def _three_digits(z_mm: float) -> str:
-    """A depth without an exponent: 1870, not 1.87e+03."""
-    return f"{float(f'{z_mm:.3g}'):g}"

@@ -172,8 +172,7 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
     outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
     true, what = None, "objects"
     if truth is not None:
-        focus = TrueFocus(outcome.sections.planes, truth)
-        true = focus.by_object if truth.are_objects_known else focus.by_pixel  # (Z, H, W)
+        true = TrueFocus(outcome.sections.planes, truth).masks(truth.mask_kind)  # (Z, H, W)
         what = "objects" if truth.are_objects_known else "what is in focus"
     images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px, pictures.box))
     lights = {pictures.light: images}

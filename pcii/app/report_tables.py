@@ -3,11 +3,15 @@
 A column or row of which nothing is known is left out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.tables import Table
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.truth import Truth
 
 NUMBERS = {
@@ -59,7 +63,7 @@ def score_table(outcome: Outcome) -> Table:
     if truth is None:
         words, rows = words[:2], [row for row in rows if row["truth"] == "object"]
     elif not truth.are_objects_known:
-        rows = [row for row in rows if row["truth"] == "pixel"]
+        rows = [row for row in rows if row["truth"] == truth.mask_kind]
     numbers = [key for key in NUMBERS if any(row[key] is not None for row in rows)]
     cells: list[tuple[str, ...]] = []
     for row in rows:
@@ -75,7 +79,7 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
     import pandas as pd
 
     truth = outcome.dataset.truth
-    kind = "object" if truth is None or truth.are_objects_known else "pixel"
+    kind = "object" if truth is None else truth.mask_kind
     rows = [row for row in outcome.score.planes if row["truth"] == kind and row["iou"] is not None]
     if rows:
         other = "nothing" if kind == "object" else "all in focus"
@@ -89,6 +93,24 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
         names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
         shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
         yield f"Depth, shares of {_pixels_of_depth(truth)}\n{shares.to_string(float_format='{:.3f}'.format)}"
+
+
+def right_share(grid: CameraGrid, depths_mm: Sequence[float], sure: float) -> str:
+    """How sure a depth map is of its depths, and what that means in mm at the farthest of some."""
+    farthest_mm = max(depths_mm)
+    total_px = total_disparity_px(grid, np.array(farthest_mm))
+    px_mm = farthest_mm - float(depth_of_total_disparity_mm(grid, total_px + 1))
+    within = f"1 px of total disparity, {px_mm:.2g} mm at {three_digits(farthest_mm)} mm"
+    return f"{sure:.0%} of its depths are right to {within}"
+
+
+def three_digits(z_mm: float) -> str:
+    """A depth without an exponent.
+
+    >>> three_digits(1868.2), three_digits(45)
+    ('1870', '45')
+    """
+    return f"{float(f'{z_mm:.3g}'):g}"
 
 
 def _pixels_of_depth(truth: Truth | None) -> str:

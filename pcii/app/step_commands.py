@@ -16,7 +16,7 @@ from pcii.app.command_options import (
 )
 from pcii.app.pipeline import full_light_sections
 from pcii.app.report_pictures import block_estimates
-from pcii.app.report_tables import result_tables
+from pcii.app.report_tables import result_tables, right_share
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
@@ -92,11 +92,8 @@ def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: 
     depths_mm, sure = find_surfaces(data.counts_or_views, z_range_mm, method)
     if not depths_mm:
         raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
-    names = ", ".join(f"{z:.4g}" for z in depths_mm)
-    say(
-        f"looking at {names} mm, where the depth map has most surfaces; {sure:.0%} of its depths are right "
-        "to 1 px of total disparity"
-    )
+    names, share = ", ".join(f"{z:.4g}" for z in depths_mm), right_share(data.grid, depths_mm, sure)
+    say(f"looking at {names} mm, where the depth map has most surfaces; {share}")
     return FocalPlanes.at_depths(data.grid, depths_mm)
 
 

@@ -31,8 +31,8 @@ STEP_PX = 1.0
 BATCH = 8
 """Planes made at a time: views that stay on disk are read once for all of them."""
 VARIANCE_WINDOW_PX = 7
-WINDOW_PX = 17
-"""Of the likelihood: smaller windows show finer things in much light, larger ones large things in little."""
+LIKELIHOOD_WINDOW_PX = 17
+"""Smaller windows show finer things in much light, larger ones large things in little."""
 SIGMAS_PER_WINDOW = 4
 """The middle 95 % of a Gaussian window of the likelihood are as wide as the window."""
 WIDER = 2.0
@@ -79,7 +79,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     """
     from scipy.ndimage import gaussian_filter
 
-    sigma_px = WINDOW_PX / SIGMAS_PER_WINDOW
+    sigma_px = LIKELIHOOD_WINDOW_PX / SIGMAS_PER_WINDOW
     events = data.events
     squared = None  # where no pixel has two photons they are their own squares; beyond 2^40 they are refused
     if events.n.max(initial=0) > 1:

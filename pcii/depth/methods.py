@@ -55,9 +55,9 @@ def estimate_depth(
     range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
     by the smoothness of surfaces and by a network that has seen many; of photon counts surfaces then have to
     explain what all cameras see (docs/theory.md). `depth_posterior` has all of it. It alone uses `z_mm` (Z,),
-    the depths of planes in which objects are expected, if any are given. "sweep-17", of
-    photon counts and with windows of 17 px, "variance-sweep" and, of radiance, "structure-tensor" are
-    textbook methods to compare with, which answer wherever there are samples.
+    the depths of planes in which objects are expected, if any are given. "sweep-17", of photon
+    counts and with windows of 17 px, "variance-sweep" and, of radiance, "structure-tensor" are textbook
+    methods to compare with, which answer wherever there are samples.
 
     Warns of frames whose saturation removed more than 2 % of the photons. Raises `InputError` for a range
     that is not 0 < near < far, a single view, a method that is not known or cannot take the data, or one of

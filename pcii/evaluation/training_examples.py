@@ -75,7 +75,7 @@ def examples(
 
 @dataclass(eq=False)
 class Examples(Sequence[Example]):
-    """What `examples` makes of datasets. A dataset of a collection is opened each time it is asked for."""
+    """A sequence with one example for each dataset. Each access opens a dataset of a collection anew."""
 
     datasets: Sequence[Dataset]
     fields: tuple[Field, ...]

@@ -44,7 +44,8 @@ SRGB_PRIMARIES = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
 PNG_PRIMARIES = (*SRGB_PRIMARIES[6:], *SRGB_PRIMARIES[:6])
 """The same of a PNG file, where white comes first."""
 LARGEST_ENCODED = 2.0
-"""Floats that stand for sRGB or have a gamma are 1 at white, and little more in sharpened pictures."""
+"""Largest encoded float that is taken: white is 1, and sharpened pictures exceed it a little. Numbers of 8
+bits or more, which are refused, reach far more: any limit from 1.5 to 100 decides alike."""
 UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
 Encoding = Literal["srgb", "linear"] | float
@@ -321,6 +322,8 @@ def _read_exr(path: Path) -> Picture:
         alpha, others = "A" in channels, sorted({*channels} - {*colours, "A"})
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
     unused = f"the channels {', '.join(others)}"[:80] if others else ""
-    said = [unused, "" if np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3) else "the chromaticities"]
-    said.append("" if aspect == 1 else f"the pixel aspect ratio of {aspect:g}")
-    return Picture(path, np.stack(planes, axis=-1)[None], alpha, unused=" and ".join(filter(None, said)))
+    unused_parts = [unused, "" if np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3) else "the chromaticities"]
+    unused_parts.append("" if aspect == 1 else f"the pixel aspect ratio of {aspect:g}")
+    return Picture(
+        path, np.stack(planes, axis=-1)[None], alpha, unused=" and ".join(filter(None, unused_parts))
+    )

@@ -91,10 +91,10 @@ def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool
 
 def read_part(root: Path, files: Files, part: str) -> dict[str, bytes]:
     """Content of the listed files of the folder `part` by their paths; `InputError` as `check_file`."""
-    own = {name: entry for name, entry in files.items() if name.startswith(f"{part}/")}
-    for name, entry in own.items():
+    listed = {name: entry for name, entry in files.items() if name.startswith(f"{part}/")}
+    for name, entry in listed.items():
         check_file(root, name, entry)
-    return {name: (root / name).read_bytes() for name in own}
+    return {name: (root / name).read_bytes() for name in listed}
 
 
 def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.store.folders import REMEDY, list_files
+from pcii.store.folders import REMEDY
 
 ARRAYS = "arrays.zip"
 
@@ -22,7 +22,8 @@ ARRAYS = "arrays.zip"
 def pack_arrays(root: Path, parts: Iterable[str]) -> list[str]:
     """Move the named folders of `root` into its archive; the paths of the files in it."""
     parts, content = list(parts), io.BytesIO()
-    names = list(list_files(root, parts))
+    paths = [path for part in parts for path in sorted((root / part).rglob("*")) if path.is_file()]
+    names = [path.relative_to(root).as_posix() for path in paths]
     with zipfile.ZipFile(content, "w") as archive:
         for name in names:
             archive.writestr(zipfile.ZipInfo(name), (root / name).read_bytes())

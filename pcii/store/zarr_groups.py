@@ -86,16 +86,16 @@ def read_array(
     from zarr.core.buffer.cpu import Buffer
     from zarr.storage import MemoryStore
 
-    own = {file: content for file, content in files.items() if file.startswith(f"{name}/")}
+    array_files = {file: content for file, content in files.items() if file.startswith(f"{name}/")}
     try:
-        store = MemoryStore({file: Buffer.from_bytes(content) for file, content in own.items()})
+        store = MemoryStore({file: Buffer.from_bytes(content) for file, content in array_files.items()})
         stored = zarr.open_array(store, path=name, mode="r", zarr_format=3)
         expected = tuple(sizes.get(dim, size) for dim, size in zip(label.dims, stored.shape, strict=True))
         if stored.shape != expected or stored.chunks != chunk_shape(expected):
             raise ValueError(f"expected a shape of {expected}, got {stored.shape}")
         if stored.dtype.name not in DTYPES:
             raise ValueError(f"expected one of {', '.join(DTYPES)}, got {stored.dtype}")
-        chunks = sum(file.startswith(f"{name}/c") for file in own)
+        chunks = sum(file.startswith(f"{name}/c") for file in array_files)
         if chunks != stored.nchunks:  # Zarr reads a missing chunk as zeros
             raise ValueError(f"expected {stored.nchunks} chunks, the manifest lists {chunks}")
         return np.asarray(stored[...])

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -34,8 +35,8 @@ class Truth(Drawn):
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
     backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
-    `unscored` are the numbers of objects that count in no score. Without `are_objects_known` nobody has told
-    what belongs to which object: there is a depth alone, and no mask of objects is right or wrong.
+    `unscored` are the numbers of objects that count in no score. If `are_objects_known` is False, depth is
+    known and objects are not, so that masks are compared by pixel alone.
 
     The other maps are None where the dataset lacks them. `normal` (H, W, 3) float32: unit normal of the
     surface in world axes, towards the camera; 0 where nothing is hit. `coverage` (H, W) float32: the share
@@ -76,6 +77,11 @@ class Truth(Drawn):
         photons = None if self.photons is None else self.photons.z_mm.size
         objects = listed(list(self.names.values()))
         return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
+    @property
+    def mask_kind(self) -> Literal["object", "pixel"]:
+        """Which true masks others are compared with first: those of objects, if these are known."""
+        return "object" if self.are_objects_known else "pixel"
 
     @property
     def has_objects(self) -> bool:

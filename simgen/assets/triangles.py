@@ -123,9 +123,9 @@ def triangulate(corners: np.ndarray, counts: np.ndarray, positions: np.ndarray) 
     is_turned = np.einsum("ij,ij->i", normals, whole[owner]) < 0
     first, begin = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
     for polygon in np.unique(owner[is_turned]):
-        own = corners[first[polygon] : first[polygon] + counts[polygon]]
-        ears = _cut_ears(positions[own], whole[polygon])
-        triangles[begin[polygon] : begin[polygon] + len(ears)] = own[ears]
+        vertices = corners[first[polygon] : first[polygon] + counts[polygon]]
+        ears = _cut_ears(positions[vertices], whole[polygon])
+        triangles[begin[polygon] : begin[polygon] + len(ears)] = vertices[ears]
     return triangles
 
 

@@ -25,7 +25,7 @@ COLOURS_OF_VERTICES = {
     ".obj": re.compile(rb"^v(?:[ \t]+[^\s#]+){6}", re.MULTILINE),
     ".ply": re.compile(rb"^property \w+ red\b(?=[\s\S]*^end_header)", re.MULTILINE),
 }
-"""How files with them can be told."""
+"""Patterns that occur in files whose vertices have colours."""
 STL_HEAD_BYTES = 84
 STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
