@@ -17,8 +17,8 @@ settings.load_profile("fast")  # unless --hypothesis-profile names another
 @pytest.fixture(scope="session")
 def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """2 x 3 views of 64 x 60 with 400 photons each, of which 120 and 30 are kept as smaller budgets."""
-    from simgen.dataset.generation import generate
-    from simgen.spec.recipe import Recipe
+    from simgen.dataset import generate
+    from simgen.spec import Recipe
 
     recipe = TINY_RECIPE | {
         "seed": 5,
@@ -36,7 +36,7 @@ def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """That of `small_benchmark`: two scenes of 2 x 2 views, with the certificate that publishes it."""
     from small_benchmark import written
 
-    from simgen.dataset.benchmark_making import CERTIFICATE, certify, make_benchmark
+    from simgen.dataset import CERTIFICATE, certify, make_benchmark
 
     folder = tmp_path_factory.mktemp("benchmark")
     definition, file = written(folder)

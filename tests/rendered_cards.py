@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 import tomli_w
 
-from simgen.dataset.benchmark_making import Definition, load_definition
+from simgen.dataset import Definition, load_definition
 
 SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
 SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}

@@ -60,6 +60,7 @@ NOT_SHARED = {
     "pcii.evidence.camera_fit",
     "pcii.store.suggested_depths",
 }
+OUTSIDE = "tests", "benchmarks", "docs", "examples", "packaging", "scenes", "training"
 MOST_FILES, FEWEST_FILES = 14, 2
 LONGEST_FILE = 450
 # Where a whole recipe is known, beside the commands: everything else takes parts of it.
@@ -84,10 +85,14 @@ def modules(package: str) -> dict[str, ast.Module]:
     return found
 
 
+def is_room(name: str) -> bool:
+    return (ROOT / name.replace(".", "/")).is_dir()
+
+
 def room_of(name: str) -> str:
     """The room that a module is in, or that a package is; "" for the package at the root."""
     parts = name.split(".")[1:]
-    return ".".join(parts if (ROOT / name.replace(".", "/")).is_dir() else parts[:-1])
+    return ".".join(parts if is_room(name) else parts[:-1])
 
 
 def imported(node: ast.AST) -> set[str]:
@@ -200,6 +205,68 @@ def test_the_page_has_the_rooms_in_their_order() -> None:
         (part,) = re.findall(rf"^{package}/ .*\n((?:  .*\n)+)", text, re.MULTILINE)
         listed = [name for line in part.splitlines() for name in re.findall(r"\w+", line[2:18])]
         assert listed == [room for room in rooms if "." not in room]
+
+
+@cache
+def public_names(room: str) -> set[tuple[str, str]]:
+    """Module and name of what the `__init__.pyi` of a room such as `pcii.types` hands out."""
+    file = ROOT / room.replace(".", "/") / "__init__.pyi"
+    nodes = ast.parse(file.read_text()).body if file.is_file() else []
+    return {
+        (".".join(filter(None, (room, node.module))), alias.name)
+        for node in nodes
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def taken_names(tree: ast.Module) -> set[tuple[str, str]]:
+    """Module and name of what a file imports by name from this project's packages."""
+    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level)
+    taken = {(str(node.module), alias.name) for node in nodes for alias in node.names}
+    return {(module, name) for module, name in taken if module.split(".")[0] in ROOMS}
+
+
+def room_with_package(module: str) -> str:
+    return ".".join(filter(None, (module.split(".")[0], room_of(module))))
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_what_other_rooms_use_is_public(package: str) -> None:
+    for name, tree in modules(package).items():
+        for module, taken in taken_names(tree):
+            if room_with_package(name) != room_with_package(module) and not is_room(f"{module}.{taken}"):
+                assert (module, taken) in public_names(room_with_package(module)), f"{name}: {module}.{taken}"
+
+
+def test_what_rooms_hand_out_has_users() -> None:
+    """In another room, in the tests, or beside the packages."""
+    outside = [file for folder in OUTSIDE for file in (ROOT / folder).rglob("*.py")]
+    trees = {file.relative_to(ROOT).as_posix(): ast.parse(file.read_text()) for file in outside}
+    taken = {(name, one) for name, tree in trees.items() for one in taken_names(tree)}
+    for package in ROOMS:
+        taken |= {
+            (room_with_package(name), one)
+            for name, tree in modules(package).items()
+            for one in taken_names(tree)
+        }
+    for package, rooms in ROOMS.items():
+        for room in (f"{package}.{room}" for room in rooms):
+            for module, name in public_names(room):
+                users = {user for user, one in taken if one in ((module, name), (room, name))} - {room}
+                assert users or (module, name) in public_names(package), f"{module}.{name}"
+
+
+def test_tests_use_what_is_public() -> None:
+    """But for what a file lists, which only becomes shorter."""
+    reaching = {
+        f"{module} {name}"
+        for file in (ROOT / "tests").rglob("*.py")
+        for module, name in taken_names(ast.parse(file.read_text()))
+        if name not in {public for _, public in public_names(module)} and not is_room(f"{module}.{name}")
+    }
+    listed = (ROOT / "tests" / "reaching_inside.txt").read_text().splitlines()
+    assert sorted(reaching) == listed
 
 
 def test_files_are_short() -> None:

@@ -14,7 +14,7 @@ from cyclopts import App
 
 from pcii.app import commands as pcii_cli
 from pcii.base import command_line
-from pcii.store.dataset import SAMPLE
+from pcii.store import SAMPLE
 from simgen.app import commands as simgen_cli
 
 pytestmark = pytest.mark.renders

@@ -14,12 +14,10 @@ from hostile_names import NAMES
 
 from pcii.app import commands as pcii_cli
 from pcii.app.command_options import depths_mm
-from pcii.base import command_line
-from pcii.base.command_line import answer_json, command_app, say, say_next
+from pcii.base import Stages, answer_json, command_line, say, say_next
+from pcii.base.command_line import command_app
 from pcii.base.plain_text import UNSEEN
-from pcii.base.progress import Stages
-from pcii.store.dataset import SAMPLE
-from pcii.store.dataset_layout import MARKER
+from pcii.store import MARKER, SAMPLE
 from simgen.app import commands as simgen_cli
 
 

@@ -16,10 +16,9 @@ from tiny import with_radiance
 
 from pcii.app import commands as pcii_commands
 from pcii.base import command_line
-from pcii.evaluation.rows import key_of, read_rows
-from pcii.store.dataset_layout import MANIFEST
-from pcii.store.folders import hash_file, read_results
-from pcii.store.verification import verify
+from pcii.evaluation import read_rows
+from pcii.evaluation.rows import key_of
+from pcii.store import MANIFEST, hash_file, read_results, verify
 from simgen.app import commands as simgen_commands
 
 pytestmark = pytest.mark.renders

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.quoted import CELLS, MARK, ROOT, pages, read_figures, rewritten, text_of
 from benchmarks.results import Value
-from pcii.base.errors import InputError
+from pcii.base import InputError
 
 GENERATED = {"benchmarks.md", "numerical_limits.md", "gallery.md", "camera_sets.md"}
 RESULTS = re.compile(

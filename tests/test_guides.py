@@ -19,10 +19,9 @@ from tiny import TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.figures.pictures import write_png
-from pcii.store.dataset import copy_sample
-from pcii.store.dataset_card import Terms, write_card
-from simgen.spec.recipe import Recipe, override
+from pcii.figures import write_png
+from pcii.store import Terms, copy_sample, write_card
+from simgen.spec import Recipe, override
 
 DOCS = ROOT / "docs"
 SLOW = {"first_hour.md", "your_own_images.md"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import simgen
-from simgen.assets.asset_files import read_mesh
+from simgen.assets import read_mesh
 from training import mesh_shapes
 from training.more_scenes import GAP_PX, TOTAL_PX_MM
 

@@ -1,1 +1,5 @@
 """The `pcii` command: order of the analysis, folder of results, report."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,5 @@
 """Tools that know nothing of cameras: errors, progress, commands, compiled loops, sRGB."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

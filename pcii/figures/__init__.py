@@ -8,3 +8,7 @@ Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or el
 too. Where no depth is answered a picture is grey, a colour that no map of values has. Matplotlib is imported
 on the first picture.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,5 @@
 """The `simgen` command, and what it does as functions."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

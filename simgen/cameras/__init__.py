@@ -1,1 +1,5 @@
 """Where cameras stand and which way their pixels look; disparities."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,5 @@
 """What a scene or recipe will give, found without rendering it."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

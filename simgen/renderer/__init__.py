@@ -1,1 +1,5 @@
 """The one room that knows Mitsuba: backends, scenes, light paths, radiance."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

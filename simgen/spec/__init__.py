@@ -1,1 +1,5 @@
 """What people write, validated: recipes and scenes with their grids, lights, materials, shapes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,9 +6,8 @@ import pytest
 from benchmarks.peers import plain_pipeline
 from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
 from benchmarks.textures import Texture, plane_views
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, Views
 
 # Three cameras a side and a whole disparity: all shifts are whole, and all peers are exact.
 GRID = CameraGrid(rows=3, cols=3, pitch_mm=(4.0, 4.0), focal_mm=1.0, pixel_mm=1.0, height=32, width=36)

@@ -6,7 +6,7 @@ from records import record
 
 from benchmarks.results import read_record, write_record
 from benchmarks.timing import median_of, ratio_of, side_by_side, timed
-from pcii.base.errors import InputError
+from pcii.base import InputError
 
 
 def test_a_record_reads_as_it_was_written(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 
 grids = st.builds(
     CameraGrid,

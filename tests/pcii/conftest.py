@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, patch_views, square_mask, unit_grid
 
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, PhotonCounts
 
 if TYPE_CHECKING:
     from report_outcomes import Written
@@ -51,7 +50,7 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, "Written"]:
     # Imported here, since a report takes most of this package and few tests want one.
     from report_outcomes import COUNTS, LIGHT, TRUTH, Written, outcome_of
 
-    from pcii.app.report import write_report
+    from pcii.app import write_report
 
     found: dict[str, Written] = {}
     for name, images, truth in (

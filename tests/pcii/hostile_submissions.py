@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.evaluation.submissions import SUBMISSION
-from pcii.store.folders import EVALUATION, EVALUATION_FOLDER, ROWS, list_files
+from pcii.evaluation import SUBMISSION
+from pcii.store import EVALUATION_FOLDER, ROWS, list_files
+from pcii.store.folders import EVALUATION
 
 Attack = tuple[Callable[[Path], object], str]
 

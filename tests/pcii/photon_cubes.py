@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 import pcii
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 
 FRAMES = 9
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.exchange.transforms_file import TransformsFile, read_transforms
+from pcii.exchange import TransformsFile, read_transforms
 
 TOP = {"fl_x": 1000.0, "fl_y": 1000.0, "w": 640, "h": 480}
 Frame = dict[str, Any]

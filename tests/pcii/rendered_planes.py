@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from pcii.store.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
-from pcii.store.folders import list_files
-from pcii.store.zarr_groups import write_arrays_safely
-from pcii.types.array_labels import TRUTH_LABELS
-from pcii.types.bayer import mosaic
-from pcii.types.camera_grid import CameraGrid
+from pcii.store import (
+    RADIANCE,
+    TRUTH,
+    list_files,
+    radiance_name,
+    write_arrays_safely,
+    write_exr_safely,
+    write_manifest,
+)
+from pcii.types import TRUTH_LABELS, CameraGrid, mosaic
 
 ABOVE_MM, BELOW_MM = 500.0, 800.0
 

@@ -5,17 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.app.pipeline import Outcome
-from pcii.app.report import write_report
-from pcii.metrics.scoring import score
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset_writer import save_dataset
-from pcii.store.suggested_depths import depth_range_of
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.app import Outcome, write_report
+from pcii.metrics import score
+from pcii.sections import reconstruct
+from pcii.store import depth_range_of, save_dataset
+from pcii.types import CameraGrid, DepthMap, PhotonCounts, Segmented, Truth, Views
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
 COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.2, GRID.shape_KLHW), GRID, cfa="GRBG")

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.base.errors import InputError
-from pcii.store.dataset_layout import (
+from pcii.base import InputError
+from pcii.store import (
     COUNTS,
-    FRAME,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
+    list_files,
     radiance_name,
+    write_arrays_safely,
     write_exr_safely,
     write_manifest,
 )
-from pcii.store.folders import list_files
-from pcii.store.zarr_groups import write_arrays_safely
-from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
+from pcii.store.dataset_layout import FRAME
+from pcii.types import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)

@@ -7,13 +7,10 @@ import pytest
 from property_settings import mostly_slow
 from twins import even_light
 
-from pcii.depth.methods import estimate_depth
-from pcii.metrics.scoring import score
-from pcii.removal.methods import segment
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.depth import estimate_depth
+from pcii.metrics import score
+from pcii.removal import segment
+from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 
 Z_MM, RANGE_MM = (150.0, 250.0), (100.0, 400.0)  # 18 to 4.5 px of disparity: with 5 x 5 views a film wide
 SIZES = [(1, 1), (2, 3), (7, 90), (64, 7), (14, 10), (33, 5), (64, 72)]

@@ -6,13 +6,8 @@ from pathlib import Path
 import numpy as np
 from twins import unit_grid
 
-from pcii.store.dataset_layout import COUNTS, TRUTH, nested_name, write_manifest
-from pcii.store.folders import list_files
-from pcii.store.zarr_groups import write_arrays_safely
-from pcii.types.array_labels import COUNTS_LABELS, TRUTH_LABELS
-from pcii.types.estimates import Segmented
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.store import COUNTS, TRUTH, list_files, nested_name, write_arrays_safely, write_manifest
+from pcii.types import COUNTS_LABELS, TRUTH_LABELS, PhotonCounts, Sections, Segmented
 
 GRID = unit_grid(2, 2, 8, 12, pitch_mm=(10.0, 10.0))
 Z_MM = (1.0, 2.0)  # 10 and 5 px of disparity: 2.5 px of blur at the other's depth

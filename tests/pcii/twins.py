@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, PhotonCounts
 
 
 def unit_grid(

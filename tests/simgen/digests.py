@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from pcii.store.dataset_layout import MANIFEST
+from pcii.store import MANIFEST
 
 
 def digest(folder: Path) -> dict[str, str]:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.scene import Scene
+from simgen.renderer import RenderScene, backend, build
+from simgen.spec import Scene
 
 DEPTH = 3
 """Bounces of a path."""

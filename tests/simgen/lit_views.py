@@ -6,18 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from pcii.store.dataset_layout import write_exr_safely
-from pcii.types.bayer import colour_index, mosaic
-from pcii.types.camera_grid import CameraGrid
-from simgen.photons.candidates import Setup
-from simgen.photons.thinning import thin_photons
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import sensitivities
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Photons, Recipe
-from simgen.spec.scene import Scene
+from pcii.store import write_exr_safely
+from pcii.types import CameraGrid, colour_index, mosaic
+from simgen.photons import Setup, thin_photons
+from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.sensor import PhotonTable, sensitivities
+from simgen.spec import Photons, Recipe, Scene
 
 CAMERA = "Nikon 5100 (NPL)"
 SCALAR = backend.choose().kind == "scalar"

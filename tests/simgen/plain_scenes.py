@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.scene import Scene
+from pcii.types import CameraGrid
+from simgen.renderer import RenderScene, backend, build
+from simgen.spec import Scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
 

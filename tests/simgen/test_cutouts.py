@@ -9,11 +9,10 @@ from lit_views import SCALAR, card, film, made, seen, surprise, thinned
 from PIL import Image
 from scipy.ndimage import label
 
-from pcii.base.errors import InputError
-from simgen.assets.cutouts import cut_out
-from simgen.assets.triangles import Triangles, box, card_triangles, cylinder
-from simgen.spec.materials import Material
-from simgen.truth.first_hits import first_hits_at_centre
+from pcii.base import InputError
+from simgen.assets import Triangles, box, card_triangles, cut_out, cylinder
+from simgen.spec import Material
+from simgen.truth import first_hits_at_centre
 
 SKY = {"type": "uniform", "luminance_cd_m2": 1.0}
 GRID = film()

@@ -9,14 +9,14 @@ import pytest
 from lit_views import SCALAR, card, film, made, seen, surprise, thinned
 from PIL import Image
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE, srgb_to_linear
-from simgen.assets.asset_files import Assets
+from pcii.base import LUMINANCE, InputError, srgb_to_linear
+from simgen.assets import Assets
 from simgen.renderer import backend
 from simgen.renderer.emission import object_lux
 from simgen.renderer.mitsuba_surfaces import light_spectrum
-from simgen.spec.scene import Scene
-from simgen.spectral.spectra import FROM_XYZ, illuminant, integral, observer
+from simgen.spec import Scene
+from simgen.spectral import illuminant, integral, observer
+from simgen.spectral.spectra import FROM_XYZ
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GRID = film()

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.exchange.export_formats import export_dataset
-from simgen.dataset.generation import generate
-from simgen.spec.recipe import Recipe
+from pcii.exchange import export_dataset
+from simgen.dataset import generate
+from simgen.spec import Recipe
 
 pytestmark = pytest.mark.renders
 CENTRE_MM, RADIUS_MM, WALL_MM = (12.0, -21.0, 500.0), 30.0, 800.0

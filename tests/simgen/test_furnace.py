@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, made, seen, thing, thinned, white
 
-from pcii.types.bayer import colour_index
+from pcii.types import colour_index
 from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, seen, sky, surprise, thinned
 
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer import RenderScene
 
 pytestmark = pytest.mark.renders
 DEPTH = 8

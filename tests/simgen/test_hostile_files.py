@@ -8,12 +8,12 @@ import pytest
 from hostile_files import BOMB, animation, binary_ply, obj, picture, ply, png, scene_toml
 from png_files import chunk
 
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.store.dataset_layout import write_exr_safely
+from pcii.base import InputError, command_line
+from pcii.store import write_exr_safely
 from simgen.app import commands
-from simgen.assets.asset_files import read_assets, read_environment
-from simgen.spec.scene_lookup import load_scene
+from simgen.assets import read_assets
+from simgen.assets.asset_files import read_environment
+from simgen.spec import load_scene
 
 LIMIT_S = 2.0
 

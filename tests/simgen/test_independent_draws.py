@@ -9,16 +9,12 @@ import pytest
 from lit_views import SCALAR, made
 from property_settings import mostly_slow
 
-from pcii.store.dataset import open_dataset
+from pcii.store import open_dataset
 from simgen.base import random_streams as seeds
-from simgen.dataset.generation import generate
-from simgen.dataset.prepared import capture_of, prepare
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan
-from simgen.photons.photon_counting import draw_from_views
-from simgen.photons.thinning import thin_photons
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Recipe
+from simgen.dataset import capture_of, generate, prepare
+from simgen.photons import Plan, Setup, draw_from_views, thin_photons
+from simgen.sensor import PhotonTable
+from simgen.spec import Recipe
 
 SIDE, CAMERAS = 16, 6
 VIEWS = CAMERAS**2

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from lit_views import made
 
-from pcii.store.dataset import open_dataset
-from pcii.store.folders import hash_json
+from pcii.store import hash_json, open_dataset
 from simgen.base import random_streams as seeds
-from simgen.dataset.generation import generate
-from simgen.photons.candidates import Setup
-from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import Grid, Photons, Recipe
+from simgen.dataset import generate
+from simgen.photons import Setup, thin_photons
+from simgen.spec import Grid, Photons, Recipe
 
 pytestmark = pytest.mark.renders
 SIDE, CAMERAS = 32, 6

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE, srgb_to_linear
+from pcii.base import LUMINANCE, InputError, srgb_to_linear
 from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

@@ -10,9 +10,9 @@ from hostile_files import ply, scene_toml
 from PIL import Image, ImageOps
 from png_files import png16
 
-from simgen.assets.asset_files import ply_bytes, read_assets, read_mesh, srgb_to_linear
-from simgen.assets.triangles import Triangles
-from simgen.spec.scene_lookup import load_scene
+from simgen.assets import Triangles, ply_bytes, read_assets, read_mesh
+from simgen.assets.asset_files import srgb_to_linear
+from simgen.spec import load_scene
 
 # A roof: a square and a triangle that share two corners.
 POINTS = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]], np.float32)

@@ -10,9 +10,8 @@ import pytest
 from lit_views import film, made, seen, surprise, thinned
 from PIL import Image
 
-from pcii.base.srgb import srgb_to_linear
-from simgen.assets.asset_files import ply_bytes
-from simgen.assets.triangles import card_triangles
+from pcii.base import srgb_to_linear
+from simgen.assets import card_triangles, ply_bytes
 from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

@@ -9,12 +9,8 @@ import pytest
 from PIL import Image
 
 from pcii.base import command_line
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_writer import save_dataset
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.store import open_dataset, save_dataset
+from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 from simgen.app import commands as cli
 from simgen.app.pictures import draw_sheet, part_of_interest, photon_tiles
 

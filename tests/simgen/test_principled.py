@@ -9,10 +9,8 @@ import pytest
 from lit_views import SCALAR, card, film, made, seen, surprise, thinned
 from PIL import Image
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import srgb_to_linear
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene
+from pcii.base import InputError, srgb_to_linear
+from simgen.renderer import RenderScene, backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVERYWHERE = {"type": "uniform", "luminance_cd_m2": 1.0}

@@ -6,13 +6,10 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from pcii.base import command_line
-from pcii.base.errors import InputError
+from pcii.base import InputError, command_line
 from simgen.app import commands
-from simgen.base.strict_models import validate
-from simgen.spec.recipe import Analysis, Recipe, load_recipe
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import load_scene
+from simgen.base import validate
+from simgen.spec import Analysis, Recipe, Scene, load_recipe, load_scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 EXPOSED = {"f_number": 8.0, "time_s": 0.01}

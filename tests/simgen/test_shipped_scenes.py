@@ -12,17 +12,11 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from simgen.check.scene_probe import coarser
-from simgen.check.targets import load_target
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
-from simgen.spec.lights import Light
-from simgen.spec.materials import Finish, Spectrum, Texture
-from simgen.spec.recipe import Grid, load_recipe
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import load_scene
-from simgen.spec.shapes import Shape
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
+from simgen.check import coarser, load_target
+from simgen.renderer import backend, build
+from simgen.spec import Grid, Light, Scene, Shape, Spectrum, Texture, load_recipe, load_scene
+from simgen.spec.materials import Finish
+from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted(file.parent.name for file in (ROOT / "scenes").glob("*/scene.toml"))

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from lit_scenes import LAMP, ball
 
-from pcii.types.bayer import colour_index, mosaic
-from simgen.dataset.prepared import capture_of
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND, sensitivities
-from simgen.spec.recipe import Recipe
-from simgen.spec.scene import Scene
-from simgen.spectral.spectra import colour_science, patch_names
+from pcii.types import colour_index, mosaic
+from simgen.dataset import capture_of
+from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.sensor import sensitivities
+from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND
+from simgen.spec import Recipe, Scene
+from simgen.spectral import patch_names
+from simgen.spectral.spectra import colour_science
 
 pytestmark = [
     pytest.mark.renders,

@@ -11,7 +11,7 @@ from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from simgen.renderer import backend
-from simgen.truth.first_hits import first_hits_of_view
+from simgen.truth import first_hits_of_view
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVENLY = {"type": "uniform", "luminance_cd_m2": 1.0}

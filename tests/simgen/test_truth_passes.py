@@ -9,24 +9,20 @@ import pytest
 from plain_scenes import built, card, grid, sphere
 
 import simgen
-from pcii.metrics.true_masks import TrueFocus
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import project_px
-from pcii.types.truth import Truth
-from simgen.cameras.rig import as_rig, centre_camera
-from simgen.renderer import backend, radiance
-from simgen.renderer.mitsuba_scene import build
-from simgen.truth import first_hits
-from simgen.truth.first_hits import (
-    COVERAGE_SAMPLES,
+from pcii.metrics import TrueFocus
+from pcii.types import CameraGrid, FocalPlanes, Truth, project_px
+from simgen.cameras import as_rig, centre_camera
+from simgen.renderer import backend, build, radiance
+from simgen.truth import (
     FirstHits,
     coverage,
+    first_hits,
     first_hits_at_centre,
     first_hits_of_view,
     in_focus,
     visible_views,
 )
+from simgen.truth.first_hits import COVERAGE_SAMPLES
 
 pytestmark = pytest.mark.renders
 WHITE = {"reflectance": [1, 1, 1]}

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import twins
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 
 Voxel = tuple[int, int, int]
 

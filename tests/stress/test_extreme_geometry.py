@@ -8,7 +8,7 @@ from property_settings import mostly_slow
 from twins import section_twin, unit_grid
 
 import pcii
-from pcii.types.geometry import total_disparity_px
+from pcii.types import total_disparity_px
 
 RANGE_MM = (300.0, 900.0)
 

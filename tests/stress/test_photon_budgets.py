@@ -8,9 +8,8 @@ from rational_sections import samples_of, variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.sections.photon_statistics import view_samples
-from pcii.types.arrays import LARGEST_COUNT
-from pcii.types.focal_planes import FocalPlanes
+from pcii.sections import view_samples
+from pcii.types import LARGEST_COUNT, FocalPlanes
 
 BUDGETS = [0, 1, 10**3, 10**6, 10**12]
 

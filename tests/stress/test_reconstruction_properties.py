@@ -11,13 +11,10 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.imaging.blocks import block_sums, on_pixels
-from pcii.imaging.mask_outlines import boundary_f
-from pcii.metrics.true_masks import mask_agreement
-from pcii.sections.photon_statistics import view_samples
-from pcii.types.bayer import PATTERNS
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_limit import Light, photon_rates, scope_energies
+from pcii.imaging import block_sums, boundary_f, on_pixels
+from pcii.metrics import mask_agreement
+from pcii.sections import view_samples
+from pcii.types import PATTERNS, FocalPlanes, Light, photon_rates, scope_energies
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
 DEPTHS = st.floats(0.3, 30)

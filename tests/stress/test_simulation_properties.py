@@ -7,20 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import unit_grid
 
-from pcii.types.bayer import PATTERNS, channel_count
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras import disparities
-from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
+from pcii.types import PATTERNS, CameraGrid, channel_count
+from simgen.cameras import as_rig, disparities, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.scopes import places
-from simgen.sensor.detector import (
-    draw_counts,
-    fixed_totals,
-    full_light_image,
-    nested_subset,
-)
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import FullLight, Lens, Photons, Sensor
+from simgen.sensor import PhotonTable, draw_counts, fixed_totals, full_light_image, nested_subset
+from simgen.spec import FullLight, Lens, Photons, Sensor
 
 GRID = unit_grid(2, 2, 4, 5)
 SEEDS = st.integers(0, 2**63 - 1)

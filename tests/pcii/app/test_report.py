@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 from report_outcomes import COUNTS, FOUND, GRID, IDS, TRUTH, Written, outcome_of, page_of
 
-from pcii.app.pipeline import Outcome
+from pcii.app import Outcome
 from pcii.app.report_pictures import MAX_SLIDER_PLANES, block_estimates, depth_errors, slider_planes
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import total_disparity_px
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, PhotonCounts, Truth, total_disparity_px
 
 
 def words_of(page: str) -> str:

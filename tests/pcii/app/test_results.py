@@ -10,20 +10,11 @@ import xarray
 from stored_datasets import flip_a_bit, largest_file, one_sentence
 from twins import unit_grid
 
-from pcii.app.results import (
-    load_estimates,
-    save_depth,
-    save_sections,
-    save_segmented,
-    writing,
-)
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Dataset
-from pcii.store.folders import RESULTS, RESULTS_FOLDER, read_results
-from pcii.store.manifests import DatasetManifest
-from pcii.store.verification import verify
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.photon_counts import PhotonCounts
+from pcii.app import load_estimates, save_depth, save_sections, save_segmented
+from pcii.app.results import writing
+from pcii.sections import reconstruct
+from pcii.store import RESULTS, RESULTS_FOLDER, Dataset, DatasetManifest, read_results, verify
+from pcii.types import DepthMap, PhotonCounts, Segmented
 
 GRID = unit_grid(2, 2, 6, 7)
 Z = np.array([0.5, 1.0])

@@ -10,12 +10,8 @@ import pytest
 
 from pcii.app.commands import app
 from pcii.base import command_line
-from pcii.store.dataset_writer import save_dataset
-from pcii.store.verification import verify
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.store import save_dataset, verify
+from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
 LIGHT = np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.float32)

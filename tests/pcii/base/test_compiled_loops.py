@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pcii.base.compiled_loops import compiled, in_threads, threads, use_threads
+from pcii.base import compiled, threads, use_threads
+from pcii.base.compiled_loops import in_threads
 
 
 @compiled

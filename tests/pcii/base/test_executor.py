@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from pcii.base.errors import InputError, WorkerLostError
-from pcii.base.executor import Executor, threads_of_worker
+from pcii.base import Executor, InputError, WorkerLostError, threads_of_worker
 
 
 class Numbers:

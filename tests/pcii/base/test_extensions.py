@@ -8,9 +8,8 @@ import pytest
 from twins import even_light, unit_grid
 
 import pcii
-from pcii.base.errors import InputError
-from pcii.base.extensions import load_function
-from pcii.evaluation.method_names import named_methods
+from pcii.base import InputError, load_function
+from pcii.evaluation import named_methods
 
 CODE = """
 from pcii import Segmented

@@ -8,15 +8,9 @@ import pytest
 from stored_datasets import DENSE, make_dataset
 
 import pcii
-from pcii.base.safe_files import (
-    locked,
-    new_folder_safely,
-    replace_folder,
-    sweep_temporaries,
-    write_bytes_safely,
-)
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import COUNTS, RADIANCE
+from pcii.base import locked, new_folder_safely, sweep_temporaries, write_bytes_safely
+from pcii.base.safe_files import replace_folder
+from pcii.store import COUNTS, RADIANCE, open_dataset
 
 
 def disk_is_full(handle: int) -> None:

@@ -12,14 +12,11 @@ from PIL import Image
 from tiny_datasets import NESTED, OWN, by_count, write_dataset
 from twins import unit_grid
 
-from pcii.base.plain_text import visible
-from pcii.metrics.scoring import score
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import open_dataset
-from pcii.types.estimates import DepthMap
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.base import visible
+from pcii.metrics import score
+from pcii.sections import reconstruct
+from pcii.store import open_dataset
+from pcii.types import DepthMap, PhotonCounts, Truth, Views
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from twins import even_light, intersection_over_union, unit_grid
 
 from pcii.baselines.simple_removals import sum_modified_laplacian
-from pcii.removal.methods import segment
-from pcii.types.photon_counts import PhotonCounts
+from pcii.removal import segment
+from pcii.types import PhotonCounts
 
 
 def test_brightness_keeps_what_is_bright_in_focus_or_not(two_squares):

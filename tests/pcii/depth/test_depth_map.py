@@ -5,19 +5,19 @@ import pytest
 from property_settings import mostly_slow
 from twins import bayer_photons, blocky_texture, even_light, opaque_views, patch_views, photons_of, unit_grid
 
-from pcii.base.errors import InputError
-from pcii.depth.methods import estimate_depth
-from pcii.depth.network_inputs import NetworkInputs
-from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.depth.sheets import SheetModel
-from pcii.depth.smooth_surface import surface_posterior
-from pcii.depth.surface_network import NetworkOutputs, run_network
-from pcii.evidence.texture_evidence import evidence_of_texture
-from pcii.removal.methods import segment
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, DepthPosterior
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import InputError
+from pcii.depth import (
+    NetworkInputs,
+    PosteriorDepth,
+    SheetModel,
+    estimate_depth,
+    run_network,
+    surface_posterior,
+)
+from pcii.depth.surface_network import NetworkOutputs
+from pcii.evidence import evidence_of_texture
+from pcii.removal import segment
+from pcii.types import CameraGrid, DepthMap, DepthPosterior, FocalPlanes, PhotonCounts
 
 RANGE_MM = (1 / 9, 1 / 1)
 

@@ -6,11 +6,10 @@ import pytest
 from twins import unit_grid
 
 import pcii
+from pcii.depth import depth_methods, estimate_depth
 from pcii.depth.depth_planes import modes_mm
-from pcii.depth.methods import GROUP, depth_methods, estimate_depth
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.depth.methods import GROUP
+from pcii.types import CameraGrid, PhotonCounts, Views
 
 RANGE_MM = (1 / 5.9, 1 / 3.1)
 TRUE_PX = 4.3

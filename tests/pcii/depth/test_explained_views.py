@@ -3,13 +3,12 @@ import pytest
 from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
+from pcii.depth import SheetModel
 from pcii.depth.explained_views import ExplainedViews, Explanation
 from pcii.depth.posterior_of_sheets import posterior_after
 from pcii.depth.sheet_kernels import expect_photons, reach_sheets
-from pcii.depth.sheets import SheetModel, Sheets, cut_sheets
-from pcii.types.estimates import DepthPosterior
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.depth.sheets import Sheets, cut_sheets
+from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
 SIDE, CAMERAS, MARGIN = 48, 5, 16
 NEAR_STEP, FAR_STEP = 5, 2

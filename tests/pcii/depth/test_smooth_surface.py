@@ -5,9 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pcii.depth import posterior_depth
-from pcii.depth.methods import estimate_depth
-from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
+from pcii.depth import SurfacePrior, estimate_depth, posterior_depth, surface_posterior
 
 PRIOR = SurfacePrior(fall=0.3, jump=0.15)
 

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.base.compiled_loops import threads, use_threads
-from pcii.depth import surface_network
-from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
-from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
-from pcii.depth.smooth_surface import SurfacePrior
-from pcii.depth.surface_network import depth_prior, near_requested, run_network
-from pcii.evidence.texture_evidence import evidence_of_texture
-from pcii.types.estimates import DepthPosterior
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import threads, use_threads
+from pcii.depth import NetworkInputs, PosteriorDepth, SurfacePrior, depth_map_of, run_network, surface_network
+from pcii.depth.network_inputs import hint_of, inputs_of
+from pcii.depth.surface_network import depth_prior, near_requested
+from pcii.evidence import evidence_of_texture
+from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
 METHOD = PosteriorDepth()
 PLANES = np.array([1.0, 3.4])

@@ -13,18 +13,11 @@ from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.base.executor import Executor
-from pcii.evaluation import measurement
-from pcii.evaluation.comparison import Evaluation, evaluate, find_datasets
-from pcii.evaluation.rows import read_frame, read_rows
-from pcii.removal.methods import METHODS
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import TRUTH, read_manifest
-from pcii.store.folders import ROWS
-from pcii.store.verification import verify
-from pcii.types.estimates import DepthMap
+from pcii.base import Executor, InputError, command_line
+from pcii.evaluation import Evaluation, evaluate, find_datasets, measurement, read_frame, read_rows
+from pcii.removal import METHODS
+from pcii.store import ROWS, TRUTH, open_dataset, read_manifest, verify
+from pcii.types import DepthMap
 
 HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
 FAKES = ("by count", "two rows")

@@ -12,17 +12,14 @@ from hostile_names import DO, NAMES
 from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 
-from pcii.app.pipeline import Outcome, analyse
-from pcii.app.report import write_report
-from pcii.base.plain_text import visible
+from pcii.app import Outcome, analyse, write_report
+from pcii.base import visible
+from pcii.evaluation import frame_of, tables, write_evaluation
 from pcii.evaluation import pages as pages_module
-from pcii.evaluation import tables
-from pcii.evaluation.pages import write_evaluation
-from pcii.evaluation.rows import frame_of, origin_of
-from pcii.removal.methods import METHODS
-from pcii.store.dataset import open_dataset
-from pcii.store.suggested_depths import depth_range_of, planes_of
-from pcii.types.estimates import Segmented
+from pcii.evaluation.rows import origin_of
+from pcii.removal import METHODS
+from pcii.store import depth_range_of, open_dataset, planes_of
+from pcii.types import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
 ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}

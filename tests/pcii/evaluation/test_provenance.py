@@ -13,10 +13,9 @@ from other_packages import install_package
 from tiny_datasets import OWN, write_dataset
 
 import pcii
-from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.method_names import NamedMethod, software_of
-from pcii.evaluation.rows import read_rows, writing_rows
-from pcii.store.software import machine, own_software
+from pcii.evaluation import NamedMethod, evaluate, read_rows, software_of
+from pcii.evaluation.rows import writing_rows
+from pcii.store import machine, own_software
 
 COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
 DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}

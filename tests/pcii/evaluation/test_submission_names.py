@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from hostile_submissions import edit
 
-from pcii.base.errors import InputError
-from pcii.evaluation.benchmark_page import COMPARISONS, write_page
+from pcii.base import InputError
+from pcii.evaluation import SUBMISSION, read_submission, write_page
+from pcii.evaluation.benchmark_page import COMPARISONS
 from pcii.evaluation.rows import ROWS
-from pcii.evaluation.submissions import SUBMISSION, read_submission
 from pcii.evaluation.tables import SIMPLE
 
 SHIPPED = Path(__file__).parents[3] / "docs" / "submissions" / "variance"

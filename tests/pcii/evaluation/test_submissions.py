@@ -12,14 +12,19 @@ from hostile_submissions import ATTACKS, DEPTH, FAULTS, SHAPE, depth, edit
 
 import pcii
 from pcii.app.commands import app
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.evaluation.benchmark_page import COMPARISONS, write_page
-from pcii.evaluation.benchmark_scores import BenchmarkHalf, open_benchmark, run_method, score_submission
-from pcii.evaluation.comparison import Evaluation
-from pcii.evaluation.submissions import SUBMISSION, read_maps, tasks_of_submission
-from pcii.store.collection import INDEX, read_index, write_index
-from pcii.store.verification import verify
+from pcii.base import InputError, command_line
+from pcii.evaluation import (
+    SUBMISSION,
+    BenchmarkHalf,
+    Evaluation,
+    open_benchmark,
+    run_method,
+    score_submission,
+    write_page,
+)
+from pcii.evaluation.benchmark_page import COMPARISONS
+from pcii.evaluation.submissions import read_maps, tasks_of_submission
+from pcii.store import INDEX, read_index, verify, write_index
 
 pytestmark = pytest.mark.renders
 HALF = "development"

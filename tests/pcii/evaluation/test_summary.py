@@ -6,19 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.base.errors import InputError
-from pcii.evaluation.rows import frame_of
-from pcii.evaluation.summary import (
-    MAX_EXACT_PAIRS,
-    RANDOM_FLIPS,
-    Kind,
-    mean_interval,
-    means,
-    means_over_scenes,
-    ranks,
-    sign_flip_p,
-    with_yardsticks,
-)
+from pcii.base import InputError
+from pcii.evaluation import frame_of, mean_interval, means, means_over_scenes, ranks, sign_flip_p
+from pcii.evaluation.summary import MAX_EXACT_PAIRS, RANDOM_FLIPS, Kind, with_yardsticks
 
 
 def test_the_interval_is_students() -> None:

@@ -9,24 +9,16 @@ import pytest
 from tiny_datasets import NESTED, OWN, write_dataset
 
 from pcii.app import commands as cli
-from pcii.app.results import load_estimates
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.depth.methods import estimate_depth
-from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.method_names import named_methods
-from pcii.evaluation.rows import read_rows
+from pcii.app import load_estimates
+from pcii.base import InputError, command_line
+from pcii.depth import estimate_depth
+from pcii.evaluation import evaluate, named_methods, read_rows
 from pcii.evaluation.tasks import tasks_of
-from pcii.metrics.bounds import object_bounds
-from pcii.removal.methods import removal_methods
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.dataset_writer import save_dataset
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import Light
-from pcii.types.truth import Truth
+from pcii.metrics import object_bounds
+from pcii.removal import removal_methods
+from pcii.sections import reconstruct
+from pcii.store import Dataset, open_dataset, save_dataset
+from pcii.types import CameraGrid, Light, PhotonCounts, Truth, Views
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
 COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.5, GRID.shape_KLHW), GRID)

@@ -9,7 +9,7 @@ import pytest
 
 import pcii
 from pcii import CameraGrid, Collection, Dataset, InputError, PhotonCounts, Truth
-from pcii.types.bayer import colour_index
+from pcii.types import colour_index
 
 GRID = CameraGrid(
     rows=3, cols=4, pitch_mm=(4.64, 5.6), focal_mm=50.0, pixel_mm=0.4, height=24, width=32, shear_px=(1, 2)

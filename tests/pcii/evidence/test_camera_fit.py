@@ -9,7 +9,7 @@ from property_settings import mostly_slow
 from rendered_cards import Card, render
 
 from pcii import CameraGrid, PhotonCounts, ViewOrder, Views, check_grid, limit_photons
-from pcii.evidence.camera_fit import CameraFit
+from pcii.evidence import CameraFit
 
 GRID = CameraGrid(rows=3, cols=3, pitch_mm=(4, 4), focal_mm=35, pixel_mm=36 / 120, height=90, width=120)
 CARDS = [Card(180, seed=1), Card(80, (0.2, 0.8, 0.1, 0.5), 2), Card(50, (0.3, 0.8, 0.6, 0.95), 3)]

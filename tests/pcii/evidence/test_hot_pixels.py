@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from twins import even_light, unit_grid
 
-from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.evidence import without_hot_pixels
+from pcii.types import FocalPlanes, PhotonCounts
 
 PLACES = [(0, 0), (5, 1), (5, 9), (9, 11)]
 DISPARITIES_PX = [4.0, 5.0, 6.0]  # from camera to camera

@@ -5,10 +5,8 @@ import pytest
 from property_settings import mostly_slow
 from twins import blocky_texture, even_light, patch_views, unit_grid
 
-from pcii.evidence.shown_depth import ShownDepth
-from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.evidence import ShownDepth, TextureModel, evidence_of_texture
+from pcii.types import FocalPlanes, PhotonCounts
 
 MODEL, BLOCK_PX, DISPARITIES_PX = TextureModel(), 2, (4.0, 4.5, 5.0, 5.5, 6.0)
 PATCH = np.s_[18:42, 26:50]  # blocks well inside the texture of `patch_of`

@@ -7,11 +7,10 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from twins import even_light, unit_grid
 
-from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.imaging.blocks import block_sums
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views
+from pcii.evidence import TextureModel, evidence_of_texture
+from pcii.imaging import block_sums
+from pcii.sections import reconstruct
+from pcii.types import FocalPlanes, Views
 
 UNBOUNDED = TextureModel(averaging_error=0.0, saturation_nats=1e12)
 

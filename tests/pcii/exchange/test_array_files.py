@@ -14,7 +14,7 @@ from scipy.io import savemat
 
 import pcii
 from pcii import InputError
-from pcii.metrics.depth_accuracy import depth_errors
+from pcii.metrics import depth_errors
 
 VIEWS_KLHW = np.random.default_rng(3).random((3, 3, 20, 24)).astype(np.float32)
 HWKL = np.ascontiguousarray(VIEWS_KLHW.transpose(2, 3, 0, 1))

@@ -21,7 +21,7 @@ from pcii import (
     import_lens_array,
     reconstruct,
 )
-from pcii.types.geometry import disparity_px
+from pcii.types import disparity_px
 
 PARAMETERS = """[intrinsics]
 focal_length_mm = 100.0

@@ -10,8 +10,16 @@ import pytest
 from stored_datasets import DENSE, GRID, IDS, Z_MM, flip_a_bit, largest_file, make_dataset, one_sentence
 
 import pcii
-from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
-from pcii.store.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest
+from pcii.store import (
+    COLLECTION_FOLDER,
+    COUNTS,
+    MANIFEST,
+    RADIANCE,
+    TRUTH,
+    index_row,
+    read_manifest,
+    write_index,
+)
 
 FORMATS = ("hci", "nerfstudio", "photoncube", "events")
 

@@ -11,10 +11,8 @@ from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
 from stored_datasets import rewrite_manifest
 
 import pcii
-from pcii.store.dataset_layout import TRUTH, read_manifest
-from pcii.store.folders import list_files
-from pcii.store.zarr_groups import write_arrays_safely
-from pcii.types.array_labels import TRUTH_LABELS
+from pcii.store import TRUTH, list_files, read_manifest, write_arrays_safely
+from pcii.types import TRUTH_LABELS
 
 
 def grid_of(rows: int, cols: int, **changes: Any) -> pcii.CameraGrid:

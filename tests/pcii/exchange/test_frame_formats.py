@@ -15,7 +15,7 @@ from PIL import Image
 import pcii
 from pcii import FrameFormat, InputError, import_counts
 from pcii.exchange.frame_formats import SURE_NATS, expected_above_one
-from pcii.types.bayer import mosaic
+from pcii.types import mosaic
 
 CAMERAS = ["--pitch-mm", 2, 2, "--focal-mm", 35, "--pixel-mm", 0.45]
 H, W, FRAMES = 12, 32, 20

@@ -11,7 +11,7 @@ from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
 
 from pcii import InputError, import_arrays, import_images
-from pcii.base.srgb import srgb_to_linear
+from pcii.base import srgb_to_linear
 
 PATTERN = "{col}_{row}.%s"
 

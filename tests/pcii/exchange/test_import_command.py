@@ -17,8 +17,8 @@ from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm
 
 from pcii import CameraGrid, open_dataset, sample
-from pcii.base.srgb import linear_to_srgb
-from pcii.store.verification import verify
+from pcii.base import linear_to_srgb
+from pcii.store import verify
 
 CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
 NAMED = ["--pattern", "{col}_{row}.png", *CAMERAS]

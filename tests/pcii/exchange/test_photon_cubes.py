@@ -14,7 +14,7 @@ from picture_folders import OPTICS
 
 from pcii import CameraGrid, FrameFormat, InputError, ViewOrder, import_counts, open_dataset
 from pcii.exchange import count_arrays
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=11, width=13)

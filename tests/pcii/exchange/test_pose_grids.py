@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 
 from pcii import InputError
-from pcii.exchange.posed_views import camera_grid_of, find_grid
+from pcii.exchange import camera_grid_of, find_grid
 from pcii.exchange.transforms_file import MOST_PX
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()

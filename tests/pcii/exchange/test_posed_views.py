@@ -11,7 +11,7 @@ from picture_folders import H, W, numbers, write
 from posed_frames import frames_of
 
 from pcii import Dataset, open_dataset, srgb_to_linear
-from pcii.store.verification import verify
+from pcii.store import verify
 
 
 def posed(

@@ -14,8 +14,7 @@ from posed_frames import TOP, frames_of, read, written
 from stored_datasets import one_sentence
 
 from pcii import InputError
-from pcii.exchange.posed_views import camera_grid_of, find_grid
-from pcii.exchange.transforms_file import read_transforms
+from pcii.exchange import camera_grid_of, find_grid, read_transforms
 
 MATRIX = frames_of(1, 1)[0]["transform_matrix"]
 

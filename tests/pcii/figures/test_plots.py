@@ -18,17 +18,22 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
 import pcii
-from pcii.figures.charts import accuracy_chart, calibration_chart
-from pcii.figures.exposure import SHOWN_PHOTONS, encoded, filled_means, smoothed, smoothing_for
-from pcii.figures.pictures import (
+from pcii.figures import (
     DEPTH_COLOURS,
     ERROR_COLOURS,
-    NO_ANSWER,
     SHARE_COLOURS,
+    accuracy_chart,
+    calibration_chart,
     depth_image,
+    encoded,
+    filled_means,
     map_image,
+    smoothed,
+    smoothing_for,
 )
-from pcii.types.focal_planes import FocalPlanes
+from pcii.figures.exposure import SHOWN_PHOTONS
+from pcii.figures.pictures import NO_ANSWER
+from pcii.types import FocalPlanes
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
 Z_MM = [1.0, 2.0]

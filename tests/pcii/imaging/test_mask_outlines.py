@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from twins import paper_grid
 
-from pcii.imaging.mask_outlines import boundary_f, object_share
-from pcii.metrics.scoring import score
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import Segmented
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.imaging import boundary_f, object_share
+from pcii.metrics import score
+from pcii.sections import reconstruct
+from pcii.types import PhotonCounts, Segmented, Truth
 
 
 def half_plane(edge_px: float, height: int = 20, width: int = 30) -> np.ndarray:

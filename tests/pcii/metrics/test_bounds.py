@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.metrics.bounds import depth_bound_px, log_gradient_squared, object_bounds
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.truth import PhotonTruth, Truth
+from pcii.metrics import depth_bound_px, object_bounds
+from pcii.metrics.bounds import log_gradient_squared
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, PhotonTruth, Truth, Views
 
 
 @pytest.mark.parametrize("grid", [unit_grid(10, 10, 64, 64), unit_grid(4, 6, 64, 64, pitch_mm=(1.0, 2.5))])

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.base.errors import InputError
-from pcii.metrics.depth_accuracy import calibration, depth_errors, hci_errors
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
-from pcii.types.truth import Truth
+from pcii.base import InputError
+from pcii.metrics import calibration, depth_errors, hci_errors
+from pcii.types import CameraGrid, DepthMap, Truth, depth_of_total_disparity_mm, total_disparity_px
 
 GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total disparity 2 / z px
 

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from twins import paper_grid
 
-from pcii.base.errors import InputError
-from pcii.metrics.scoring import score
-from pcii.metrics.true_masks import TrueFocus, mask_agreement
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import blur_half_extent_px
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import PhotonTruth, Truth
+from pcii.base import InputError
+from pcii.metrics import TrueFocus, mask_agreement, score
+from pcii.sections import reconstruct
+from pcii.types import DepthMap, FocalPlanes, PhotonCounts, PhotonTruth, Segmented, Truth, blur_half_extent_px
 
 GRID = paper_grid(24, 32)
 Z = np.array([540.0, 620.0])

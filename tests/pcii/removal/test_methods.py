@@ -5,13 +5,12 @@ import pytest
 from property_settings import mostly_slow
 from twins import even_light, intersection_over_union, unit_grid
 
-from pcii.base.errors import InputError
-from pcii.imaging.bright_regions import roberts_magnitude, without_specks
-from pcii.removal.methods import segment
-from pcii.sections.reconstruction import with_probes
-from pcii.store.dataset import sample
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import InputError
+from pcii.imaging import roberts_magnitude, without_specks
+from pcii.removal import segment
+from pcii.sections import with_probes
+from pcii.store import sample
+from pcii.types import FocalPlanes, PhotonCounts
 
 ABLE = ["three-step", "posterior"]
 methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "shape-from-focus"])

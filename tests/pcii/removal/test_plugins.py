@@ -9,9 +9,9 @@ import pytest
 from other_packages import install_package
 from twins import even_light, unit_grid
 
-from pcii.base.errors import InputError
-from pcii.removal.methods import METHODS, removal_methods, segment
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import InputError
+from pcii.removal import METHODS, removal_methods, segment
+from pcii.types import PhotonCounts
 
 CODE = """
 from dataclasses import replace

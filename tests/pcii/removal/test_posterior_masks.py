@@ -1,12 +1,9 @@
 import numpy as np
 
-from pcii.depth.methods import depth_posterior
-from pcii.depth.posterior_depth import depth_map_of
-from pcii.removal.methods import segment
-from pcii.removal.posterior_masks import masks_of
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import DepthPosterior
-from pcii.types.focal_planes import FocalPlanes
+from pcii.depth import depth_map_of, depth_posterior
+from pcii.removal import masks_of, segment
+from pcii.sections import reconstruct
+from pcii.types import DepthPosterior, FocalPlanes
 
 
 def test_a_block_belongs_to_the_most_probable_plane_or_to_none(two_squares):

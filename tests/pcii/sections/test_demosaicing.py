@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import demosaic_twin
 
-from pcii.base.errors import InputError
-from pcii.sections.demosaicing import demosaic
-from pcii.types.bayer import PATTERNS, colour_index, mosaic
+from pcii.base import InputError
+from pcii.sections import demosaic
+from pcii.types import PATTERNS, colour_index, mosaic
 
 RED, GREEN, BLUE = 0, 1, 2
 # The paper counts rows and columns from 1: its pixel 43 is [3, 2] here.

@@ -6,11 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import Reader, colour_of, samples_of, unit_grid
 
-from pcii.base.errors import InputError
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import InputError
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, PhotonCounts, Views
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 

@@ -6,19 +6,17 @@ from scipy import stats
 from twins import unit_grid
 
 import pcii
-from pcii.sections.photon_statistics import (
+from pcii.sections import (
     ViewSamples,
     entropy_bits,
     pooled_estimate,
+    reconstruct,
     region_entropy_bits,
-    saturation_loss,
     truncated_poisson_variance,
     view_samples,
 )
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections.photon_statistics import saturation_loss
+from pcii.types import CameraGrid, FocalPlanes, PhotonCounts
 
 PAPER_RATE = 1000 * 3.4e-4
 

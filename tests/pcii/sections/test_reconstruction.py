@@ -5,11 +5,8 @@ from hypothesis import strategies as st
 from twins import blocky_texture, section_twin, unit_grid
 
 import pcii
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.bayer import PATTERNS, mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections import reconstruct
+from pcii.types import PATTERNS, CameraGrid, PhotonCounts, Views, mosaic
 
 patterns = st.sampled_from([*PATTERNS, None])
 # Depths whose disparity is exact, so that the twin's order of operations cannot matter.

@@ -8,18 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pcii.base.errors import InputError
-from pcii.store.collection import (
+from pcii.base import InputError
+from pcii.store import (
     COLLECTION_FOLDER,
     INDEX,
+    MANIFEST,
     Collection,
     index_row,
     open_collection,
-    split_of,
+    read_manifest,
+    verify,
     write_index,
+    write_manifest,
 )
-from pcii.store.dataset_layout import MANIFEST, read_manifest, write_manifest
-from pcii.store.verification import verify
+from pcii.store.collection import split_of
 
 GRID = {"rows": 1, "cols": 2, "pitch_mm": (5, 5), "focal_mm": 50, "pixel_mm": 0.05, "height": 4, "width": 6}
 FIELDS = ["scene_number", "photons.budget", "seed"]

@@ -20,21 +20,21 @@ from stored_datasets import (
 import pcii
 from pcii.app import commands
 from pcii.base import command_line
-from pcii.store.dataset import SAMPLE, open_dataset
-from pcii.store.dataset_layout import (
+from pcii.store import (
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
+    SAMPLE,
     TRUTH,
+    list_files,
+    open_dataset,
     radiance_name,
     read_exr,
+    verify,
     write_exr_safely,
 )
-from pcii.store.folders import list_files
-from pcii.store.verification import verify
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import Light
+from pcii.types import Light, PhotonCounts
 
 # A dataset, read back
 

@@ -8,12 +8,21 @@ from hostile_names import NAMES
 from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, rewrite_manifest
 
-from pcii.base.errors import InputError
-from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
-from pcii.store.dataset_card import SOFTWARE, Terms, write_card, write_licence
-from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
-from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
-from pcii.store.verification import verify
+from pcii.base import InputError
+from pcii.store import (
+    CARD,
+    COLLECTION_FOLDER,
+    MANIFEST,
+    Terms,
+    index_row,
+    read_manifest,
+    verify,
+    write_card,
+    write_index,
+    write_licence,
+)
+from pcii.store import LICENCE as LICENCE_FILE
+from pcii.store.dataset_card import SOFTWARE
 
 MAX_LINES = 30
 TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "https://example.org/photons")

@@ -10,14 +10,9 @@ from hostile_names import NAMES
 from stored_datasets import DENSE, GRID, IDS, Z_MM
 from twins import unit_grid
 
-from pcii.base.errors import InputError
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import COUNTS
-from pcii.store.dataset_writer import save_dataset
-from pcii.store.verification import verify
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import PhotonTruth, Truth
+from pcii.base import InputError
+from pcii.store import COUNTS, open_dataset, save_dataset, verify
+from pcii.types import PhotonCounts, PhotonTruth, Truth, Views
 
 LIGHT = np.random.default_rng(1).random((*GRID.shape_KLHW, 3)).astype(np.float32)
 COUNTED = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG")

@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 from stored_datasets import flip_a_bit, one_sentence
 
-from pcii.base.safe_files import write_bytes_safely
-from pcii.store.collection import COLLECTION_FOLDER
-from pcii.store.dataset_layout import DATASET_FOLDER
-from pcii.store.folders import (
+from pcii.base import write_bytes_safely
+from pcii.store import (
+    COLLECTION_FOLDER,
+    DATASET_FOLDER,
     EVALUATION_FOLDER,
     RESULTS_FOLDER,
-    FolderKind,
     check_file,
     check_free,
     list_files,
     unlisted_files,
 )
+from pcii.store.folders import FolderKind
 from pcii.store.manifests import Manifest
 
 KINDS = {kind.what: kind for kind in (DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER)}

@@ -9,11 +9,20 @@ import pytest
 from stored_datasets import flip_a_bit, make_dataset
 from tiny_datasets import OWN, write_dataset
 
-from pcii.base.errors import InputError
-from pcii.store.collection import COLLECTION_FOLDER, index_row, write_index
-from pcii.store.dataset_layout import MANIFEST, read_manifest
-from pcii.store.folders import EVALUATION_FOLDER, RESULTS_FOLDER, ROWS, list_files
-from pcii.store.verification import verify, verify_and_tell
+from pcii.base import InputError
+from pcii.store import (
+    COLLECTION_FOLDER,
+    EVALUATION_FOLDER,
+    MANIFEST,
+    RESULTS_FOLDER,
+    ROWS,
+    index_row,
+    list_files,
+    read_manifest,
+    verify,
+    verify_and_tell,
+    write_index,
+)
 
 
 def make_results(root: Path, versions: dict[str, str] | None = None) -> Path:

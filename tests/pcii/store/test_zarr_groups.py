@@ -10,14 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from stored_datasets import flip_a_bit, one_sentence
 
-from pcii.store.folders import list_files, read_part
-from pcii.store.zarr_groups import (
-    CHUNK_ELEMENTS,
-    chunk_shape,
-    read_array,
-    write_arrays_safely,
-)
-from pcii.types.array_labels import Label
+from pcii.store import list_files, read_array, read_part, write_arrays_safely
+from pcii.store.zarr_groups import CHUNK_ELEMENTS, chunk_shape
+from pcii.types import Label
 
 Y = Label(("step",), "three numbers", "mm")
 METADATA = "zarr.json"

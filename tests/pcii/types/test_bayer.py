@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import colour_of
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import PATTERNS, colour_cells, colour_index, mosaic
+from pcii.base import InputError
+from pcii.types import PATTERNS, colour_cells, colour_index, mosaic
 
 R, G, B = 0, 1, 2
 

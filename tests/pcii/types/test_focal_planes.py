@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twins import paper_grid, unit_grid, voxel_of
 
-from pcii.base.errors import InputError
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import blur_half_extent_px, disparity_px, project_px, total_disparity_px
+from pcii.base import InputError
+from pcii.types import FocalPlanes, blur_half_extent_px, disparity_px, project_px, total_disparity_px
 
 depths = st.floats(200, 5000)
 

@@ -12,10 +12,8 @@ from scipy.stats import poisson
 from twins import samples_of, unit_grid
 
 import pcii
-from pcii.base.errors import InputError
-from pcii.types.images import Views
-from pcii.types.photon_counts import MOST_FRAMES, PhotonCounts, Readout
-from pcii.types.photon_limit import Light, limit_photons
+from pcii.base import InputError
+from pcii.types import MOST_FRAMES, Light, PhotonCounts, Readout, Views, limit_photons
 
 
 def events_of(counts: PhotonCounts) -> list[tuple[int, ...]]:

@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.base.errors import InputError
-from pcii.removal.methods import segment
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
-from pcii.types.truth import Truth
+from pcii.base import InputError
+from pcii.removal import segment
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, DepthMap, FocalPlanes, PhotonCounts, Sections, Segmented, Truth, Views
 
 GOOD: dict[str, Any] = {
     "rows": 2,

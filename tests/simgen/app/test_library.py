@@ -11,9 +11,9 @@ from tiny import GRID_2_X_3, TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.types.photon_counts import Readout
+from pcii.types import Readout
 from simgen.photons import counting_plan
-from simgen.spec.recipe import Recipe
+from simgen.spec import Recipe
 
 GRID = Recipe.model_validate(TINY_RECIPE).grid.camera_grid()
 SCENE = simgen.Scene(

@@ -4,14 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.store.verification import verify
+from pcii.base import InputError, command_line
+from pcii.store import verify
 from simgen.app import commands as simgen_cli
-from simgen.app.starting_points import list_recipes, list_scenes, write_new_recipe, write_new_scene
-from simgen.check.targets import lint
-from simgen.spec.recipe import load_recipe
-from simgen.spec.scene_lookup import load_scene
+from simgen.app import list_recipes, list_scenes, write_new_recipe, write_new_scene
+from simgen.check import lint
+from simgen.spec import load_recipe, load_scene
 
 
 @pytest.fixture(autouse=True)

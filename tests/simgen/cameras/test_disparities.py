@@ -6,18 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
-from simgen.cameras.disparities import (
-    apart_px,
-    colour_samples,
-    mending_pitch_mm,
-    share_seen_by_all,
-    shares_without,
-    shifts_px,
-)
+from pcii.sections import reconstruct
+from pcii.types import CameraGrid, FocalPlanes, PhotonCounts
+from simgen.cameras import apart_px, mending_pitch_mm, share_seen_by_all, shares_without
+from simgen.cameras.disparities import colour_samples, shifts_px
 
 
 def at_disparity(pixels: float, **more: Any) -> tuple[CameraGrid, float]:

@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import Camera
+from pcii.types import CameraGrid
+from simgen.cameras import Camera
 from simgen.renderer.radiance import object_windows
-from simgen.spec.recipe import Lens
+from simgen.spec import Lens
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.2, height=150, width=200)
 WHOLE = [(slice(0, 150), slice(0, 200))]

@@ -10,22 +10,16 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 from tiny import TINY_RECIPE
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import project_px
-from simgen.base.strict_models import validate
-from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
-from simgen.photons.candidates import Setup
-from simgen.photons.thinning import thin_photons
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.path_tracing import film_rays
-from simgen.renderer.radiance import render_view
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Lens, Photons, Recipe
-from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_at_centre, first_hits_of_view
+from pcii.base import InputError
+from pcii.types import CameraGrid, mosaic, project_px
+from simgen.base import validate
+from simgen.cameras import Cameras, Rig, as_rig, rig_of
+from simgen.cameras.rig import turn
+from simgen.photons import Setup, thin_photons
+from simgen.renderer import RenderScene, backend, build, film_rays, render_view
+from simgen.sensor import PhotonTable
+from simgen.spec import Lens, Photons, Recipe, Scene
+from simgen.truth import first_hits_at_centre, first_hits_of_view
 
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"

@@ -11,17 +11,14 @@ from lit_scenes import ball
 
 from pcii.base import command_line
 from simgen.app import commands as cli
-from simgen.cameras.disparities import apart_px, disparities_px
+from simgen.cameras import apart_px, disparities_px
+from simgen.check import Facts, Finding, ObjectFacts, coarser, findings, probe_scene
 from simgen.check.depths import depth_findings, focus_share
 from simgen.check.light import cost_findings, photon_findings, photons_per_view, seconds
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts, coarser, probe_scene
 from simgen.check.sight import sight_findings
-from simgen.check.targets import findings
-from simgen.dataset.prepared import Prepared
-from simgen.dataset.resources import peak_bytes, product_bytes
-from simgen.photons.counting_plan import Plan
-from simgen.spec.recipe import Recipe
-from simgen.spec.scene import Scene
+from simgen.dataset import Prepared, peak_bytes, product_bytes
+from simgen.photons import Plan
+from simgen.spec import Recipe, Scene
 
 SKY = {"type": "uniform", "luminance_cd_m2": 100.0}
 EVEN = np.full(3, 0.25)

@@ -10,24 +10,11 @@ import pytest
 from small_benchmark import SCENE, written
 
 import pcii
-from pcii.base import command_line
-from pcii.base.errors import InputError
-from pcii.store.collection import CROISSANT, INDEX
-from pcii.store.dataset_layout import CARD, LICENCE
-from pcii.store.folders import hash_file, hash_json
-from pcii.store.verification import verify
+from pcii.base import InputError, command_line
+from pcii.store import CARD, CROISSANT, INDEX, LICENCE, hash_file, hash_json, verify
 from simgen.app.commands import app
-from simgen.dataset.benchmark_making import (
-    CERTIFICATE,
-    BenchmarkSeries,
-    Definition,
-    benchmark_files,
-    certify,
-    compare,
-    load_definition,
-    make_benchmark,
-    published_certificate,
-)
+from simgen.dataset import CERTIFICATE, Definition, certify, load_definition, make_benchmark
+from simgen.dataset.benchmark_making import BenchmarkSeries, benchmark_files, compare, published_certificate
 
 pytestmark = pytest.mark.renders
 

@@ -10,20 +10,12 @@ import pytest
 from digests import digest
 from tiny import GRID_2_X_3
 
-from pcii.base import command_line
-from pcii.base.errors import InputError, WorkerLostError
-from pcii.base.executor import Executor
-from pcii.base.safe_files import locked
-from pcii.store import software
-from pcii.store.collection import COLLECTION, INDEX, open_collection
-from pcii.store.dataset_layout import CARD, MARKER
-from pcii.store.verification import verify
+from pcii.base import Executor, InputError, WorkerLostError, command_line, locked
+from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, software, verify
 from simgen.app import commands as cli
-from simgen.dataset import dataset_collection
-from simgen.dataset.dataset_collection import DatasetJob, generate_collection
-from simgen.dataset.generation import generate
-from simgen.spec.recipe import load_recipe
-from simgen.spec.sweeps import Sweep, load_sweep
+from simgen.dataset import dataset_collection, generate, generate_collection
+from simgen.dataset.dataset_collection import DatasetJob
+from simgen.spec import Sweep, load_recipe, load_sweep
 
 pytestmark = pytest.mark.renders
 TOML = f'scene = "plain_pair"\nseed = 7\n{GRID_2_X_3}[photons]\nbudget = [100, 200]\n'

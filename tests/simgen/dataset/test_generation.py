@@ -12,17 +12,11 @@ from stored_datasets import flip_a_bit, one_sentence
 from tiny import TINY_RECIPE
 from zarr.storage import ZipStore
 
-from pcii.base.errors import InputError
-from pcii.store import software
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
-from pcii.store.packed_arrays import ARRAYS
-from pcii.store.verification import verify
-from simgen.cameras.rig import rig_of
-from simgen.dataset import rendered_views
-from simgen.dataset.generation import generate
-from simgen.dataset.prepared import Prepared
-from simgen.spec.recipe import Recipe
+from pcii.base import InputError
+from pcii.store import ARRAYS, MANIFEST, MARKER, RADIANCE, TRUTH, open_dataset, software, verify
+from simgen.cameras import rig_of
+from simgen.dataset import Prepared, generate, rendered_views
+from simgen.spec import Recipe
 
 pytestmark = pytest.mark.renders
 TINY = TINY_RECIPE | {

@@ -11,10 +11,9 @@ import tomli_w
 from pydantic import BaseModel
 
 from pcii.store import software
-from simgen.base.file_lookup import find_all
-from simgen.dataset.prepared import prepare
-from simgen.spec.recipe import Recipe, load_recipe
-from simgen.spec.scene import Scene
+from simgen.base import find_all
+from simgen.dataset import prepare
+from simgen.spec import Recipe, Scene, load_recipe
 
 Table = dict[str, Any]
 

@@ -11,9 +11,7 @@ import pytest
 from digests import digest
 from tiny import with_radiance
 
-from pcii.store.collection import open_collection
-from pcii.store.dataset_layout import MANIFEST, MARKER
-from pcii.store.verification import verify
+from pcii.store import MANIFEST, MARKER, open_collection, verify
 
 pytestmark = [pytest.mark.renders, pytest.mark.slow]
 KILLS = 20

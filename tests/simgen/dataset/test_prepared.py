@@ -7,10 +7,9 @@ import pytest
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.store.dataset_layout import TRUTH
-from simgen.dataset.generation import generate
-from simgen.dataset.prepared import prepare
-from simgen.spec.recipe import Analysis, Recipe
+from pcii.store import TRUTH
+from simgen.dataset import generate, prepare
+from simgen.spec import Analysis, Recipe
 
 LIGHT = '[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 100.0\n'
 

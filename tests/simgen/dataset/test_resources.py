@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from pcii.base import command_line
-from pcii.base.errors import InputError
+from pcii.base import InputError, command_line
 from simgen.app import commands as cli
-from simgen.dataset.resources import check_resources, peak_bytes, shortage
-from simgen.photons.counting_plan import Plan
-from simgen.spec.recipe import Recipe
+from simgen.dataset import check_resources, peak_bytes, shortage
+from simgen.photons import Plan
+from simgen.spec import Recipe
 
 ROOM = 8e9
 DEPTHS_MM = (500.0, 600.0, 3000.0)

@@ -7,11 +7,10 @@ from digests import digest
 from property_settings import mostly_slow
 from tiny import GRID_2_X_2
 
-from pcii.base.progress import silent
-from simgen.dataset import generation
-from simgen.dataset.generation import Reuse, generate, make
-from simgen.dataset.prepared import Prepared, prepare
-from simgen.spec.recipe import load_recipe
+from pcii.base import silent
+from simgen.dataset import Prepared, generate, generation, prepare
+from simgen.dataset.generation import Reuse, make
+from simgen.spec import load_recipe
 
 pytestmark = pytest.mark.renders
 TOML = f'scene = "plain_pair"\nseed = 3\n{GRID_2_X_2}[photons]\nbudget = 100\n'

@@ -10,8 +10,7 @@ from digests import digest
 from tiny import GRID_2_X_2, with_radiance
 from writers import Writer
 
-from pcii.store.collection import open_collection
-from pcii.store.verification import verify
+from pcii.store import open_collection, verify
 
 pytestmark = [pytest.mark.renders, pytest.mark.slow]
 TIMES = 20

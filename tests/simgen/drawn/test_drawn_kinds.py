@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 import simgen
-from pcii.base.errors import InputError
-from simgen.dataset.prepared import prepare
-from simgen.spec.recipe import Recipe
-from simgen.spec.scene_lookup import GROUP, drawn_scenes, is_drawn, load_scene
-from simgen.spec.sweeps import load_sweep
+from pcii.base import InputError
+from simgen.dataset import prepare
+from simgen.spec import Recipe, drawn_scenes, is_drawn, load_scene, load_sweep
+from simgen.spec.scene_lookup import GROUP
 
 NUMBERS = (0, 1, 7, 17, 99, 100, 101, 102, 103, 250)
 # SHA-256 of the scenes of these numbers. A change of one makes figures that were reported of other scenes.

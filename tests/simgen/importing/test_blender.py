@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.importing.scene_import import import_scene
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
-from simgen.spec.scene_lookup import load_scene
-from simgen.truth.first_hits import first_hits_at_centre
+from pcii.types import CameraGrid
+from simgen.importing import import_scene
+from simgen.renderer import backend, build
+from simgen.spec import load_scene
+from simgen.truth import first_hits_at_centre
 
 BY_BLENDER = Path(__file__).parent / "by_blender"
 LARGEST_MM = 0.05

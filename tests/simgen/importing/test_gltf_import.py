@@ -10,19 +10,14 @@ import pytest
 from gltf_draft import QUAD, QUAD_UV, GltfDraft
 from PIL import Image
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import linear_to_srgb, srgb_to_linear
-from pcii.types.camera_grid import CameraGrid
-from simgen.assets.asset_files import read_assets
-from simgen.assets.triangles import triangles_of
-from simgen.importing.scene_import import import_scene
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
+from pcii.base import InputError, linear_to_srgb, srgb_to_linear
+from pcii.types import CameraGrid
+from simgen.assets import read_assets, triangles_of
+from simgen.importing import import_scene
+from simgen.renderer import backend, build, render_view
 from simgen.renderer.mitsuba_shapes import pose_of
-from simgen.renderer.radiance import render_view
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import load_scene
-from simgen.truth.first_hits import first_hits_at_centre
+from simgen.spec import Scene, load_scene
+from simgen.truth import first_hits_at_centre
 
 RNG = np.random.default_rng(5)
 TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 2, 0), (0, 0, 3)], "<f4") / 20

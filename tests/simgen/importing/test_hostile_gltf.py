@@ -11,8 +11,8 @@ import pytest
 from gltf_draft import QUAD_UV, GltfDraft, glb
 from hostile_files import png
 
-from pcii.base.errors import InputError
-from simgen.importing.scene_import import import_scene
+from pcii.base import InputError
+from simgen.importing import import_scene
 
 LIMIT_S = 2.0
 AT_600: dict[str, Any] = {"place_at_mm": (0.0, 0.0, 600.0)}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from simgen import Mesh, Scene, import_scene, load_scene
-from simgen.assets.asset_files import read_mesh
+from simgen.assets import read_mesh
 
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]
 """Of a box 2 wide, 4 along Y, 6 along Z."""

@@ -9,14 +9,11 @@ import pytest
 
 import pcii
 import simgen
-from pcii.base.errors import InputError
+from pcii.base import InputError
+from simgen.photons import Setup
 from simgen.photons.bright_light import lit_light, mirrored_light, straight_light
-from simgen.photons.candidates import Setup
 from simgen.photons.exploration import sampler_of_films
-from simgen.renderer import backend
-from simgen.renderer.light_tracing import LampTracer
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
+from simgen.renderer import LampTracer, RenderScene, backend, build, render_view
 from tests.png_files import png16
 
 pytestmark = pytest.mark.renders

@@ -11,23 +11,25 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import simgen
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
-from simgen.assets.triangles import globe
-from simgen.cameras.rig import Rig, as_rig
-from simgen.dataset.prepared import capture_of
-from simgen.photons import scalar_sampler, wavefront_sampler
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan, probe
-from simgen.photons.emission_sampler import EmissionSampler
-from simgen.photons.exploration import explore
-from simgen.photons.photon_counting import draw_from_views
+from pcii.base import InputError
+from pcii.types import CameraGrid
+from simgen.assets import globe
+from simgen.cameras import Rig, as_rig
+from simgen.dataset import capture_of
+from simgen.photons import (
+    EmissionSampler,
+    Plan,
+    Setup,
+    draw_from_views,
+    explore,
+    probe,
+    scalar_sampler,
+    thin_photons,
+    wavefront_sampler,
+)
 from simgen.photons.shining_pieces import pieces_in_view
-from simgen.photons.thinning import thin_photons
-from simgen.renderer import backend
-from simgen.renderer.emission import ShiningSurface
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.recipe import Lens, Photons, Recipe
+from simgen.renderer import RenderScene, ShiningSurface, backend, build
+from simgen.spec import Lens, Photons, Recipe
 
 COMPILED = backend.choose().kind != "scalar"
 BUDGET = 4000.0 if COMPILED else 400.0

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
-from simgen.photons.exploration import MAX_RAYS
-from simgen.photons.majorant import Majorant, fit
+from pcii.types import CameraGrid
+from simgen.photons import MAX_RAYS, Majorant, fit, layers_for, tile_px_for
+from simgen.photons.disparity_layers import Samples
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
 DIM = np.array([0.02, 0.01, 0.03])

@@ -10,26 +10,17 @@ import pytest
 import zarr
 from scipy import stats
 
-from pcii.base.errors import InputError
-from pcii.base.progress import silent
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
-from pcii.types.bayer import colour_index
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import Light
-from simgen.dataset.prepared import capture_of, least_samples
+from pcii.base import InputError, silent
+from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, Dataset, nested_name, open_dataset
+from pcii.types import Light, PhotonCounts, colour_index
+from simgen.dataset import capture_of
+from simgen.dataset.prepared import least_samples
+from simgen.photons import Plan, Setup, draw_from_views, photon_counting, probe, write_counts
 from simgen.photons import counting_plan as module
-from simgen.photons import photon_counting
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, PROBE_SEED, Plan, probe
-from simgen.photons.photon_counting import draw_from_views, write_counts
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.detector import nested_subset
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Recipe
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import load_scene
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, PROBE_SEED
+from simgen.renderer import RenderScene, backend, build
+from simgen.sensor import PhotonTable, nested_subset
+from simgen.spec import Recipe, Scene, load_scene
 
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 BUDGETS = (120, 40, 8)

@@ -6,12 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lit_scenes import two_balls
 
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_limit import sense
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, PROBE_SAMPLES, Probe, probe
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.renderer.radiance import render_view
+from pcii.types import CameraGrid, sense
+from simgen.photons import Setup, probe
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, PROBE_SAMPLES, Probe
+from simgen.renderer import RenderScene, render_view
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=1.0, height=64, width=64)
 DRAWS = 30

@@ -10,23 +10,15 @@ import pytest
 from lit_scenes import DEPTH, EVENLY, LAMP, ball, lit, two_balls
 from scipy import stats
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import colour_index, mosaic
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import as_rig
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, plan
-from simgen.photons.exploration import Exploration, explore
-from simgen.photons.majorant import Majorant, fit
-from simgen.photons.thinning import thin_photons
-from simgen.renderer import backend
-from simgen.renderer.backend import load_drjit
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Photons
-from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_of_view
+from pcii.base import InputError
+from pcii.types import CameraGrid, colour_index, mosaic
+from simgen.cameras import as_rig
+from simgen.photons import Capture, Exploration, Majorant, Setup, explore, fit, plan, thin_photons
+from simgen.photons.counting_plan import MAX_NOISE_SHARE
+from simgen.renderer import RenderScene, backend, build, load_drjit, render_view
+from simgen.sensor import PhotonTable
+from simgen.spec import Photons, Scene
+from simgen.truth import first_hits_of_view
 
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"

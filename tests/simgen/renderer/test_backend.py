@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pcii.base import command_line
-from pcii.base.errors import InputError
+from pcii.base import InputError, command_line
 from simgen.app import commands as simgen_cli
 from simgen.renderer import backend
 

@@ -9,11 +9,10 @@ import pytest
 from PIL import Image
 
 import simgen
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_reference import reference_to
-from simgen.spec.mitsuba_file import MitsubaFile
+from pcii.base import InputError
+from pcii.types import CameraGrid
+from simgen.renderer import backend, reference_to
+from simgen.spec import MitsubaFile
 
 SIDE, TILES, REPEATS, SAMPLES, DEPTH = 48, 8, 6, 48, 5
 ANGLE_DEG, FOCAL_MM = 35.0, 50.0

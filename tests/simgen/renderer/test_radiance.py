@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from lit_scenes import two_balls
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import as_rig
-from simgen.renderer.radiance import render_view, windows_of_objects
+from pcii.types import CameraGrid
+from simgen.cameras import as_rig
+from simgen.renderer import render_view, windows_of_objects
 
 pytestmark = pytest.mark.renders
 GRID = CameraGrid(

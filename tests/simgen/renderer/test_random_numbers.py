@@ -5,8 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from simgen.renderer import backend
-from simgen.renderer.random_numbers import streams_for
+from simgen.renderer import backend, streams_for
 
 pytestmark = pytest.mark.skipif(
     backend.choose().kind == "scalar", reason="scalar mode has the numbers of NumPy and of Mitsuba"

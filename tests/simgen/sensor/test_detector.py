@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import colour_index, mosaic
-from pcii.types.camera_grid import CameraGrid
-from simgen.sensor.detector import dark_map, detect, full_light_image, read_out
-from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, no_photons
-from simgen.spec.recipe import FullLight, Sensor
+from pcii.base import InputError
+from pcii.types import CameraGrid, colour_index, mosaic
+from simgen.sensor import PhotonTable, dark_map, detect, full_light_image, no_photons, read_out
+from simgen.sensor.photon_table import NO_OBJECT
+from simgen.spec import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)
 COLUMNS = [field.name for field in fields(PhotonTable)]

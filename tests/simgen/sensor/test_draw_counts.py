@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from pcii.types.bayer import colour_index
-from pcii.types.photon_limit import Light, Scope, photon_rates, scope_energies, sense
-from simgen.sensor.detector import draw_counts, fixed_totals
-from simgen.spec.recipe import Photons
+from pcii.types import Light, Scope, colour_index, photon_rates, scope_energies, sense
+from simgen.sensor import draw_counts, fixed_totals
+from simgen.spec import Photons
 
 
 def ramp(height: int = 12, width: int = 10) -> np.ndarray:

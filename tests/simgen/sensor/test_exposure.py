@@ -7,20 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pcii.base.progress import silent
-from pcii.types.bayer import colour_index
-from pcii.types.photon_limit import sense
-from simgen.dataset.prepared import capture_of
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan, plan
-from simgen.photons.photon_counting import draw_from_views, thin
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Exposure, Recipe
-from simgen.spec.scene import Scene
+from pcii.base import silent
+from pcii.types import colour_index, sense
+from simgen.dataset import capture_of
+from simgen.photons import Plan, Setup, draw_from_views, plan, thin
+from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.sensor import PhotonTable, photons_per_radiance
+from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND
+from simgen.spec import Exposure, Recipe, Scene
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.sensor import detector
-from simgen.sensor.detector import counts_of, read_out
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Sensor
+from pcii.types import CameraGrid
+from simgen.sensor import PhotonTable, counts_of, detector, read_out
+from simgen.spec import Sensor
 
 FILM = CameraGrid(rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.1, height=200, width=250)
 PIXELS = 100_000

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from two_things import BALL, NAMED, SCENE, SKY
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from simgen import Material, Scene, Spectrum, load_scene
-from simgen.base.strict_models import LARGEST_TOML_BYTES, toml_text
-from simgen.spec.scene_lookup import scene_names
+from simgen.base import LARGEST_TOML_BYTES, toml_text
+from simgen.spec import scene_names
 
 
 def same(loaded: Scene, scene: Scene) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from two_things import BALL, CARD, NAMED, SCENE, SKY
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from simgen import (
     AreaLight,
     Backdrop,
@@ -25,9 +25,8 @@ from simgen import (
     Spectrum,
     Sphere,
 )
-from simgen.base.file_lookup import ImageName
-from simgen.base.strict_models import validate
-from simgen.spec.scene import checked_folder
+from simgen.base import ImageName, validate
+from simgen.spec import checked_folder
 
 CHECKS = Checks(rows=1, columns=2)
 BOX: Any = Box(width_mm=1, height_mm=1, depth_mm=1)

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.radiance import render_view
-from simgen.spec.scene import Scene
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre
+from pcii.base import InputError
+from pcii.types import CameraGrid
+from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.spec import Scene
+from simgen.truth import FirstHits, first_hits_at_centre
 
 pytestmark = pytest.mark.renders
 H, W, PIXEL, FOCAL = 90, 120, 0.0704, 50.0

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from pcii.base.errors import InputError
-from simgen.spec.recipe import load_recipe
-from simgen.spec.sweeps import Axis, load_sweep
+from pcii.base import InputError
+from simgen.spec import load_recipe, load_sweep
+from simgen.spec.sweeps import Axis
 
 TOML = """
 scene = "two_objects"

@@ -9,17 +9,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import srgb_to_linear
-from simgen.assets.texture_pixels import paint, square_wave
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
-from simgen.renderer.radiance import render_view
-from simgen.spec.lights import UniformLight
-from simgen.spec.materials import Checks, Edge, Material, Noise, Star, Stripes, Text, Texture
-from simgen.spec.recipe import Grid
-from simgen.spec.scene import Scene, SceneObject
-from simgen.spec.shapes import Card
+from pcii.base import InputError, srgb_to_linear
+from simgen.assets import paint
+from simgen.assets.texture_pixels import square_wave
+from simgen.renderer import backend, build, render_view
+from simgen.spec import (
+    Card,
+    Checks,
+    Edge,
+    Grid,
+    Material,
+    Noise,
+    Scene,
+    SceneObject,
+    Star,
+    Stripes,
+    Text,
+    Texture,
+    UniformLight,
+)
 
 RED, GREY = (0.9, 0.1, 0.2), (0.6, 0.6, 0.6)
 LINEAR = srgb_to_linear(np.array([RED, GREY]))

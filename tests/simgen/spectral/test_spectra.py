@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.base.errors import InputError
-from simgen.base.strict_models import validate
-from simgen.spec.scene import Scene
-from simgen.spectral import spectra
-from simgen.spectral.filters import CELLS, Filters, filters_for, sensitivity
-from simgen.spectral.spectra import (
+from pcii.base import InputError
+from simgen.base import validate
+from simgen.spec import Scene
+from simgen.spectral import (
+    CELLS,
     WAVELENGTH_NM,
-    colour_science,
+    Filters,
+    filters_for,
     illuminant,
     integral,
-    linear_srgb,
-    measured,
     observer,
     patch,
     patch_names,
-    tint,
+    sensitivity,
+    spectra,
 )
+from simgen.spectral.spectra import colour_science, linear_srgb, measured, tint
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 

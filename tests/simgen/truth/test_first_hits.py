@@ -7,11 +7,10 @@ import pytest
 from PIL import Image
 from plain_scenes import built, card, grid, sphere
 
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.geometry import project_px
-from pcii.types.images import Views
-from simgen.renderer.radiance import render_view
-from simgen.truth.first_hits import first_hits_at_centre
+from pcii.sections import reconstruct
+from pcii.types import Views, project_px
+from simgen.renderer import render_view
+from simgen.truth import first_hits_at_centre
 
 pytestmark = pytest.mark.renders
 

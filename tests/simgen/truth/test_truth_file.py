@@ -8,14 +8,13 @@ import xarray
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.base.errors import InputError
-from pcii.metrics.true_masks import TrueFocus
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import TRUTH
-from pcii.types.focal_planes import FocalPlanes
-from simgen.base.strict_models import validate
-from simgen.dataset.generation import generate
-from simgen.spec.recipe import Recipe
+from pcii.base import InputError
+from pcii.metrics import TrueFocus
+from pcii.store import TRUTH, open_dataset
+from pcii.types import FocalPlanes
+from simgen.base import validate
+from simgen.dataset import generate
+from simgen.spec import Recipe
 
 pytestmark = pytest.mark.renders
 PLANES = {"z_mm": [540, 620]}

@@ -15,14 +15,13 @@ from twins import (
 )
 
 import pcii
-from pcii.base.errors import InputError
-from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges
+from pcii.base import InputError
+from pcii.imaging import cheapest_planes, pieces_along_ridges
+from pcii.removal.three_step import ThreeStep
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
-from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.removal.three_step.variance_threshold import adaptive_threshold
-from pcii.sections.reconstruction import with_probes
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections import with_probes
+from pcii.types import FocalPlanes, PhotonCounts
 
 NOTHING = ThreeStep(threshold=False, boundary=False, entropy=False)
 

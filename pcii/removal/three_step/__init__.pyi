@@ -1,0 +1,1 @@
+from .three_step_method import ThreeStep as ThreeStep

@@ -1,0 +1,7 @@
+from . import spectra as spectra
+from .filters import CELLS as CELLS, Filters as Filters, HEROES as HEROES, camera_names as camera_names
+from .filters import filters_for as filters_for, sensitivity as sensitivity
+from .spectra import DAYLIGHT as DAYLIGHT, WAVELENGTH_NM as WAVELENGTH_NM, illuminant as illuminant
+from .spectra import illuminant_names as illuminant_names, integral as integral
+from .spectra import known_illuminant as known_illuminant, known_patch as known_patch, observer as observer
+from .spectra import patch as patch, patch_names as patch_names, srgb_of as srgb_of
