@@ -32,8 +32,8 @@ METHOD = "posterior"
 PAGE = """# Scores of removal, kind by kind
 
 The methods of removal that ship, on the test half of [the benchmark](../benchmark.md). [Its page](../{page})
-has the scores of each scene with their intervals, and depth. Made by `docs/make_benchmark_page.py`;
-times are of {machine}.
+has the scores of each scene with their intervals, and depth. Made by `docs/make_benchmark_page.py`.
+Times are of {machine}.
 
 [Removal of defocused points](../removal.md) describes the methods; [the three steps](three_step.md) show what
 limits them.
