@@ -12,7 +12,6 @@ from pcii.types import colour_index, mosaic
 from simgen.dataset import capture_of
 from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import sensitivities
-from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND
 from simgen.spec import Recipe, Scene
 from simgen.spectral import patch_names
 from simgen.spectral.spectra import colour_science
@@ -155,7 +154,7 @@ def photons_of_grey(camera: str | None) -> np.ndarray:
     luminosity = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape).values[:, 1]
     if camera is None:  # photons of 555 nm, whatever the colour
         reflected = (light * grey * luminosity).sum() / (light * luminosity).sum()
-        return np.full(3, reflected * PHOTONS_PER_LUMEN_SECOND)
+        return np.full(3, reflected * 555e-9 / (683 * 6.62607015e-34 * 299792458))
     watts_per_lumen_nm = light / (683.002 * (light * luminosity).sum())
     photons_per_watt_second = wavelength_nm * 1e-9 / (6.62607015e-34 * 299792458)
     curves = colour.MSDS_CAMERA_SENSITIVITIES[camera].copy()

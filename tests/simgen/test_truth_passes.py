@@ -22,10 +22,10 @@ from simgen.truth import (
     in_focus,
     visible_views,
 )
-from simgen.truth.first_hits import COVERAGE_SAMPLES
 
 pytestmark = pytest.mark.renders
 WHITE = {"reflectance": [1, 1, 1]}
+COVERAGE_SAMPLES = 233
 CENTRE, RADIUS = np.array([20.0, -15.0, 650.0]), 60.0
 
 

@@ -14,7 +14,6 @@ from simgen.photons import Setup
 from simgen.photons.bright_light import lit_light, mirrored_light, straight_light
 from simgen.photons.exploration import sampler_of_films
 from simgen.renderer import LampTracer, RenderScene, backend, build, render_view
-from tests.png_files import png16
 
 pytestmark = pytest.mark.renders
 
@@ -199,25 +198,6 @@ def test_a_lamp_in_a_scene_with_a_medium_is_in_the_forecast(tmp_path: Path, shap
     if shape == "disk":
         with pytest.raises(InputError, match="'lamp' gives"):
             simgen.draw_photons(scene, GRID, budget=2000, seed=0, cfa=None, max_depth=4)
-
-
-def test_a_bright_spot_of_a_picture_counts_by_itself(tmp_path: Path) -> None:
-    pixels = np.full((64, 64, 3), 1 << 9, dtype=np.int64)
-    pixels[40, 20] = 0xFFFF
-    (tmp_path / "screen.png").write_bytes(png16(pixels))
-    emission = simgen.Emission.model_validate({"luminance_cd_m2": 1e4, "texture": "screen.png"})
-    screen = simgen.SceneObject(
-        name="screen",
-        position_mm=(0, 0, 500),
-        shape=simgen.Card(width_mm=60, height_mm=60),
-        material=simgen.Material(reflectance=(0, 0, 0), emission=emission),
-    )
-    setup = Setup(built(scene_of([screen]), tmp_path), GRID, None, 2)
-    rows = sorted(straight_light(setup), key=lambda row: row.radiance)
-    texel_px = (60 / 64 / 500 * FOCAL_PX) ** 2
-    assert rows[-1].radiance > 5e3
-    assert rows[-1].image_px < 2 * texel_px
-    assert rows[0].image_px > 100 * texel_px
 
 
 def test_a_spot_that_single_precision_cannot_tell_is_refused(tmp_path: Path) -> None:

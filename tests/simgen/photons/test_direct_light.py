@@ -13,7 +13,6 @@ from scipy import stats
 import simgen
 from pcii.base import InputError
 from pcii.types import CameraGrid
-from simgen.assets import globe
 from simgen.cameras import Rig, as_rig
 from simgen.dataset import capture_of
 from simgen.photons import (
@@ -27,7 +26,6 @@ from simgen.photons import (
     thin_photons,
     wavefront_sampler,
 )
-from simgen.photons.shining_pieces import pieces_in_view
 from simgen.renderer import RenderScene, ShiningSurface, backend, build
 from simgen.spec import Lens, Photons, Recipe
 
@@ -181,19 +179,6 @@ def test_a_window_that_fills_all_films_has_their_area() -> None:
     assert used <= 1
     away = replace(window, corners_mm=window.corners_mm[:, ::-1])
     assert area_of(as_rig(GRID), away) == (0.0, 0.0)
-
-
-def test_pieces_of_a_ball_cover_half_of_it() -> None:
-    radius, centre = 5.0, np.array([0.0, 0.0, 500.0])
-    triangles = globe(radius, 16)
-    surface = ShiningSurface(
-        1,
-        triangles.positions.astype(np.float64)[triangles.faces] + centre,
-        np.ones(3),
-        ball=(centre, radius, np.eye(3)),
-    )
-    pieces = pieces_in_view([surface], as_rig(GRID))
-    assert 0.5 < pieces.area_mm2.sum() / (4 * np.pi * radius**2) < 0.75  # what no camera sees is left out
 
 
 @pytest.mark.renders

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pcii.types import Light, Scope, colour_index, photon_rates, scope_energies, sense
+from pcii.types import Light, Scope, colour_index, photon_rates, scope_energies
 from simgen.sensor import draw_counts, fixed_totals
 from simgen.spec import Photons
 
@@ -43,17 +43,3 @@ def test_multinomial_totals_are_exact(scope: Scope) -> None:
     else:
         colours = colour_index(12, 10, "GRBG")
         assert [int(drawn[0][colours == c].sum()) for c in range(3)] == [700, 700, 700]
-
-
-def test_expected_photons_share_the_budget_in_proportion_to_the_light() -> None:
-    raw = ramp()
-    rates = photon_rates(raw, "GRBG", Light(500), scope_energies(raw, "GRBG", "view"))
-    np.testing.assert_allclose(rates, 500 * raw / raw.sum(), rtol=1e-12)
-    rates = photon_rates(raw, "RGGB", Light(500, "channel"), scope_energies(raw, "RGGB", "channel"))
-    colours = colour_index(12, 10, "RGGB")
-    for colour in range(3):
-        assert rates[colours == colour].sum() == pytest.approx(500, rel=1e-12)
-    for scope in ("view", "channel", "scene"):  # darkness gets none, and no warning
-        energies = scope_energies(0 * raw, "GRBG", scope)
-        assert (photon_rates(0 * raw, "GRBG", Light(500, scope), energies) == 0).all()
-    np.testing.assert_allclose(sense(np.full((2, 2, 3), 7.0), None), 7.0, rtol=1e-12)

@@ -18,14 +18,13 @@ from simgen import (
     Glass,
     Level,
     Material,
-    Mesh,
     PointLight,
     Scene,
     SceneObject,
     Spectrum,
     Sphere,
 )
-from simgen.base import ImageName, validate
+from simgen.base import validate
 from simgen.spec import checked_folder
 
 CHECKS = Checks(rows=1, columns=2)
@@ -44,40 +43,17 @@ def fault_of(make: Callable[[], Any]) -> str:
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
-        (
-            lambda: Sphere(radius_mm=-1),
-            "Sphere: 'radius_mm': input should be greater than",
-        ),
-        (
-            lambda: Material(finish=Glass(), texture=CHECKS),
-            "Material: texture: the colour of glass",
-        ),
-        (
-            lambda: Material(finish=Glass(), opacity=ImageName("a.png")),
-            "Material: opacity: a surface",
-        ),
+        (lambda: Sphere(radius_mm=-1), "Sphere: 'radius_mm': input should be greater than"),
+        (lambda: Material(finish=Glass(), texture=CHECKS), "Material: texture: the colour of glass"),
         (lambda: Spectrum(wavelength_nm=(400, 500), value=(0.5,)), "Spectrum: give as many values"),
-        (lambda: Mesh(file=""), "Mesh: 'file': string should have at least 1 character"),
         (lambda: Level(illuminance_lux=float("nan"), z_mm=500), "Level: 'illuminance_lux': input should be"),
         (lambda: Scene(title="x", lights=()), "Scene: 'lights': nothing shines"),
-        (
-            lambda: setattr(BALL, "name", "b"),
-            "SceneObject: 'name': instance is frozen",
-        ),
-        (lambda: SKY.change(illuminant=(0, 0, 0)), "UniformLight: 'illuminant': light must not be black"),
-        (
-            lambda: LAMP.change(target_mm=LAMP.position_mm),
-            "AreaLight: target_mm: a lamp must face",
-        ),
+        (lambda: setattr(BALL, "name", "b"), "SceneObject: 'name': instance is frozen"),
+        (lambda: LAMP.change(target_mm=LAMP.position_mm), "AreaLight: target_mm: a lamp must face"),
         (lambda: SCENE.add(BALL), "Scene: 'objects': two objects are named 'ball'"),
         (lambda: SCENE.add(BOX), "Scene: 'lights[1].type': there is no 'box'; known are area"),
-        (lambda: SCENE.replace("ball", BOX), "Scene: 'objects[0]"),
         (lambda: SCENE.replace("ball", radius_mm=3), "SceneObject: unknown key 'radius_mm'"),
         (lambda: SCENE.move("ball", by_mm=(1, 1)), "move: 'by_mm[2]' is missing"),
-        (
-            lambda: SCENE.move("ball", by_mm=(1e6, 0, 0)),
-            "SceneObject: 'position_mm[0]': input should",
-        ),
         (lambda: SCENE.move("bell"), "scene: there is no object 'bell'; did you mean 'ball'?"),
         (lambda: SCENE.remove("x"), "scene: there is no object 'x'; known are ball, card"),
     ],

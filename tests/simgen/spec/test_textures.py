@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from pcii.base import InputError, srgb_to_linear
 from simgen.assets import paint
-from simgen.assets.texture_pixels import square_wave
 from simgen.renderer import backend, build, render_view
 from simgen.spec import (
     Card,
@@ -37,25 +36,6 @@ BLACK_WHITE = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 def share_of_second(texture: Texture, aspect: float = 1.0) -> np.ndarray:
     """Of a texture in black and white, (H, W), so that reflectance is the area's share itself."""
     return paint(texture.change(colours=BLACK_WHITE), aspect)[..., 0].astype(float)
-
-
-@pytest.mark.parametrize(("span_x", "span_y"), [(0.3, 0.0), (0.11, 0.07), (0.4, 1.9), (1e-3, 1e-12)])
-def test_the_mean_of_a_square_wave_is_that_of_many_points(span_x: float, span_y: float) -> None:
-    cycles = np.linspace(-1.2, 1.3, 51)
-    inside = (np.arange(400) + 0.5) / 400 - 0.5
-    offsets = (inside[:, None] * span_x + inside * span_y).ravel()
-    many = np.array([np.sign(np.sin(2 * np.pi * (one + offsets))).mean() for one in cycles])
-    # Each of up to 6 borders in a pixel may be off by one row of the 400, and a border counts twice.
-    np.testing.assert_allclose(square_wave(cycles, span_x, span_y), many, atol=2 * 6 / 400)
-
-
-def test_a_turned_square_wave_is_right_where_rounding_is_worst() -> None:
-    """Within one half cycle the wave is constant, whatever a pixel spans of it."""
-    span = 1 / 4096
-    for other in 10.0 ** np.arange(-12.0, -3.0):
-        wave = square_wave(np.array([0.1, 0.3, 0.6]), span, other * span)
-        np.testing.assert_allclose(wave, [1, 1, -1], atol=2e-5)  # what its docstring promises
-        assert np.abs(wave).max() <= 1  # or reflectances could lie below 0
 
 
 def test_checks_start_with_the_first_colour_and_are_mixed_by_area_in_linear_light() -> None:
@@ -163,8 +143,7 @@ def slope_of(plane: np.ndarray) -> float:
     return np.polyfit(x, np.log(y) / 2, 1)[0]
 
 
-@pytest.mark.parametrize("exponent", [0.0, 1.0, 1.6])
-@pytest.mark.parametrize("aspect", [1.0, 2.0])
+@pytest.mark.parametrize(("exponent", "aspect"), [(0.0, 1.0), (1.0, 2.0), (1.6, 1.0)])
 def test_the_noises_spectrum_falls_by_its_exponent(exponent: float, aspect: float) -> None:
     def mean_slope(exponent: float) -> float:
         noises = (Noise(exponent=exponent, contrast=0.2, pixels=256, seed=seed) for seed in range(9))
