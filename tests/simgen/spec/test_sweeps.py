@@ -77,7 +77,7 @@ def test_a_folder_keeps_its_name_when_values_are_added(recipe_file: str) -> None
 def test_folders_of_scenes_that_are_named_by_a_path_are_told_apart_by_a_hash(
     recipe_file: str, tmp_path: Path
 ) -> None:
-    names = ("my scene", "my+scene", "my-scene")
+    names = ("my scene", "my  scene", "my-scene")
     for name in names:
         Scene(title="light", lights=(UniformLight(luminance_cd_m2=1.0),)).save(tmp_path / name)
     sweep = load_sweep(recipe_file, ["photons.budget=100", f"scene={{each={[*names]}}}"])
