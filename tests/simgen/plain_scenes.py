@@ -9,13 +9,11 @@ from simgen.spec import Scene
 LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
 
 
-def built(
-    folder: Path, objects: list[dict], *, backdrop_mm: float | None = 3000.0, spectral: bool = False
-) -> RenderScene:
+def built(folder: Path, objects: list[dict], *, backdrop_mm: float | None = 3000.0) -> RenderScene:
     values: dict = {"title": "test", "objects": objects, "lights": [LIGHT]}
     if backdrop_mm is not None:
         values["backdrop"] = {"z_mm": backdrop_mm}
-    return build(backend.load(spectral=spectral), Scene.model_validate(values), folder, 2)
+    return build(backend.load(), Scene.model_validate(values), folder, 2)
 
 
 def grid(rows: int, cols: int, height: int, width: int, pixel_mm: float = 0.0704) -> CameraGrid:

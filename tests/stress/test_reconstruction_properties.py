@@ -3,7 +3,6 @@
 from fractions import Fraction
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as nst
@@ -11,15 +10,12 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.imaging import boundary_f
-from pcii.metrics import mask_agreement
 from pcii.sections import view_samples
 from pcii.types import PATTERNS, FocalPlanes, Light, photon_rates, scope_energies
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
 DEPTHS = st.floats(0.3, 30)
 SEEDS = st.integers(0, 2**32 - 1)
-MASKS = nst.arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12)))
 
 
 def film_of(grid: pcii.CameraGrid, seed: int) -> np.ndarray:
@@ -86,20 +82,3 @@ def test_samples_of_windows_are_those_of_fractions(seed: int, cell: int, window:
 
 
 # Scores
-
-
-@given(MASKS, SEEDS)
-def test_agreement_is_a_share_and_knows_no_order(claimed: np.ndarray, seed: int) -> None:
-    true = np.random.default_rng(seed).random(claimed.shape) < 0.5
-    found, turned = mask_agreement(claimed, true), mask_agreement(true, claimed)
-    shares = [*found.pop("everything").values(), *found.values()]
-    assert all(value is None or 0 <= value <= 1 for value in shares)
-    assert found["precision"] == turned["recall"]
-    if claimed.any() and true.any():
-        assert found["iou"] == turned["iou"]
-    assert boundary_f(claimed, true) == pytest.approx(boundary_f(true, claimed))
-    same = mask_agreement(claimed, claimed)
-    assert same["false_share"] == 0
-    assert same["iou"] == same["f1"] == (1 if claimed.any() else None)
-    if claimed.any() and not claimed.all():  # one that fills the frame has no outline, and 0
-        assert same["boundary_f"] == 1

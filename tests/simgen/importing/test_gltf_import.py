@@ -327,19 +327,6 @@ def test_pictures_lie_as_in_the_file(tmp_path: Path, transform: dict[str, Any], 
     assert " ".join("".join(row) for row in found) == seen
 
 
-def test_a_glow_needs_a_place_for_each_pixel(tmp_path: Path) -> None:
-    fan = np.vstack([QUAD, [(0, 0, 0)]]).astype("<f4")
-    faces = np.array([0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4], "<u2")
-    layouts = {"once": [*QUAD_UV, (0.5, 0.5)], "twice": [(0, 0), (1, 0), (0, 0), (1, 0), (0.5, 1)]}
-    for name, uv in layouts.items():
-        draft = GltfDraft()
-        glow = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": draft.texture(png(QUARTERS))}}
-        draft.node(mesh=draft.mesh(fan, faces, np.array(uv, "<f4"), glow), translation=[0, 0, -4])
-        scene, left_out = imported(draft, tmp_path / name, place_at_mm=(0.0, 0.0, 600.0))
-        assert (scene.objects[0].material.emission is not None) == (name == "once")
-        assert any("shine" in what for what in left_out) == (name == "twice")
-
-
 def test_parts_of_a_mesh_are_objects_named_by_their_materials(tmp_path: Path) -> None:
     draft = GltfDraft()
     mesh = draft.mesh(material={"name": "oak"})

@@ -1,5 +1,7 @@
 """Dense radiance: fewer samples where no object can be seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lit_scenes import two_balls
@@ -7,6 +9,8 @@ from lit_scenes import two_balls
 from pcii.types import CameraGrid
 from simgen.cameras import as_rig
 from simgen.renderer import render_view, windows_of_objects
+from simgen.spec import Lens
+from simgen.truth import first_hits_of_view
 
 pytestmark = pytest.mark.renders
 GRID = CameraGrid(
@@ -36,7 +40,12 @@ def test_objects_have_their_samples_and_the_background_fewer() -> None:
     # differ by half the brightest light at outlines.
     assert np.abs(sparse - dense)[is_window].max() < 0.1 * dense.max()
     assert not np.array_equal(sparse[is_window], dense[is_window])
+    assert is_window[first_hits_of_view(scene, GRID, 0, 1).object_id > 0].all()
     assert saved == 255 * GRID.height * GRID.width - 256 * is_window.sum()
+
+    # With a lens all of the film is one.
+    lens = replace(as_rig(GRID), lens=Lens(aperture_mm=5.0, focus_mm=500.0))
+    assert windows_of_objects(scene, lens.camera(0, 1), 256, 1)[0] == [(slice(0, 70), slice(0, 80))]
 
     # Windows that would cost more are not rendered.
     plain, fewer = (
