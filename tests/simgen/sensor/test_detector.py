@@ -1,6 +1,6 @@
 """What a sensor loses, adds and cuts off: exact small cases, and statistics whose planted fault is caught."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -213,26 +213,6 @@ def test_dead_pixels_never_count() -> None:
     assert silent(counts + counted(dark)).sum() < 30  # the fault: dark counts in dead pixels
     another = silent(counted(detect(arrivals, GRID, "GRBG", dead, seed=4)))
     assert (another != silent(counts)).any()
-
-
-TEN = films(1, 1, 2, 5)
-UP_TO_NINE = np.arange(10).reshape(1, 1, 2, 5)
-
-
-@pytest.mark.parametrize("bits", [1, 2, 3, 32])
-def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
-    most = 2**bits - 1
-    expected = np.minimum(UP_TO_NINE, most)
-    photons = arriving(UP_TO_NINE)
-    np.testing.assert_array_equal(counted(read_out(photons, TEN, Sensor(bits=bits), seed=1), TEN), expected)
-    k, l, i, j = (np.tile(index, 2) for index in np.nonzero(UP_TO_NINE))
-    n = UP_TO_NINE[UP_TO_NINE > 0]
-    in_two_lumps = PhotonTable(k, l, i, j, np.concatenate([n // 2, n - n // 2]))
-    stopped = read_out(in_two_lumps, TEN, Sensor(bits=bits), seed=1)
-    np.testing.assert_array_equal(counted(stopped, TEN), expected)
-    one_after_the_other = np.minimum(in_two_lumps.n, most)  # the fault: each lump stops by itself
-    wrong = counted(replace(in_two_lumps, n=one_after_the_other), TEN)
-    assert bits == 32 or (wrong != expected).any()
 
 
 def companions(n: list[int]) -> PhotonTable:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from two_things import BALL, CARD, NAMED, SCENE, SKY
+from two_things import BALL, CARD, SCENE, SKY
 
 from pcii.base import InputError
 from simgen import (
@@ -25,7 +25,6 @@ from simgen import (
     Sphere,
 )
 from simgen.base import validate
-from simgen.spec import checked_folder
 
 CHECKS = Checks(rows=1, columns=2)
 BOX: Any = Box(width_mm=1, height_mm=1, depth_mm=1)
@@ -125,15 +124,3 @@ def test_the_folder_goes_with_a_scene_and_is_no_part_of_its_value(tmp_path: Path
     assert "folder" not in Scene.model_json_schema()["properties"]
     with pytest.raises(InputError, match=r"unknown key 'folder'"):
         validate(Scene, {"folder": "x", "title": "x", "lights": [SKY]}, "scene.toml")
-
-
-def test_files_are_looked_for_in_the_folder(tmp_path: Path) -> None:
-    assert checked_folder(SCENE) == Path()
-    where = "scene: object 'ball', material.texture"
-    assert fault_of(lambda: checked_folder(NAMED)).startswith(
-        f"{where}: 'a.png' is looked for in the scene's"
-    )
-    told = fault_of(lambda: checked_folder(NAMED.change(folder=tmp_path)))
-    assert told == f"{where}: there is no file 'a.png' in {tmp_path}"
-    (tmp_path / "a.png").write_bytes(b"")
-    assert checked_folder(NAMED.change(folder=tmp_path)) == tmp_path
