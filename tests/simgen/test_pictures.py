@@ -33,7 +33,7 @@ def grid(**changes: Any) -> CameraGrid:
 def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Path) -> None:
     look, sheet = tmp_path / "look.jpg", tmp_path / "sheet.png"
     title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
-    command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "2", *title]
+    command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "1", *title]
     assert command_line.run(cli.app, command) == 0
     assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
     assert_shows_something(look)

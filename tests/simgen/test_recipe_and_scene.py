@@ -13,6 +13,7 @@ from simgen.spec import Analysis, Recipe, Scene, load_recipe, load_scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 EXPOSED = {"f_number": 8.0, "time_s": 0.01}
+LENS = {"aperture_mm": 6.0, "focus_mm": 600.0}
 
 
 def scene_with(**thing: object) -> dict[str, Any]:
@@ -81,6 +82,11 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
         ({"grid": {"rows": 2.0}}, "'grid.rows': input should be a valid integer"),
         ({"grid": {"pitch_mm": [1, "1"]}}, "'grid.pitch_mm[1]': input should be a valid number"),
         ({"grid": {"focal_mm": 1e-5}}, "focal_mm: 0.00180224 mm or more is needed"),
+        ({"grid": {"lens": LENS, "shear_px": (1.0, 0.0)}}, "leave out shear_px"),
+        (
+            {"grid": {"lens": LENS}, "exposure": EXPOSED},
+            "focal_mm / exposure.f_number is 6.25 mm, and aperture_mm is 6; make them agree",
+        ),
         ({"sensor": {"cfa": "GRGB"}}, "'GRBG', 'RGGB', 'BGGR', 'GBRG' or 'none', got 'GRGB'"),
         ({"sensor": {"full_light": {}}}, "exposure: photons.scope = 'exposure' and sensor.full_light need"),
         ({"photons": {"scope": "exposure"}}, "exposure: photons.scope = 'exposure' and sensor.full_light"),

@@ -8,11 +8,8 @@ import pytest
 from lit_scenes import DEPTH, two_balls
 from scipy import stats
 from scipy.spatial.transform import Rotation
-from tiny import TINY_RECIPE
 
-from pcii.base import InputError
 from pcii.types import CameraGrid, mosaic
-from simgen.base import validate
 from simgen.cameras import Cameras, Rig, as_rig, rig_of
 from simgen.photons import Setup, thin_photons
 from simgen.renderer import RenderScene, backend, build, render_view
@@ -209,23 +206,3 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
 
     assert p_value(rates(rig)) > 1e-3
     assert p_value(rates(pinholes)) < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("grid", "exposure", "message"),
-    [
-        (
-            {"lens": {"aperture_mm": 6.25, "focus_mm": 600.0}, "shear_px": (1.0, 0.0)},
-            {},
-            "leave out shear_px",
-        ),
-        (
-            {"lens": {"aperture_mm": 6.0, "focus_mm": 600.0}},
-            {"exposure": {"f_number": 8.0}},
-            "focal_mm / exposure.f_number is 6.25 mm, and aperture_mm is 6; make them agree",
-        ),
-    ],
-)
-def test_cameras_that_cannot_be_are_refused(grid: dict, exposure: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        validate(Recipe, TINY_RECIPE | exposure | {"grid": TINY_RECIPE["grid"] | grid}, "x.toml")

@@ -11,7 +11,7 @@ from small_benchmark import SCENE, written
 import pcii
 from pcii.base import InputError, command_line
 from pcii.store import CARD, CROISSANT, INDEX, LICENCE, hash_file, hash_json, verify
-from simgen.app.commands import app
+from simgen.app import commands
 from simgen.dataset import CERTIFICATE, Definition, certify, load_definition, make_benchmark
 from simgen.dataset.benchmark_making import BenchmarkSeries, compare
 
@@ -95,9 +95,9 @@ def test_scenes_that_are_not_there_are_named(
     made: tuple[Definition, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["benchmark", "make", str(made[1]), "-o", str(tmp_path / "x"), "--scene", "pear"]
-    assert command_line.run(app, arguments) == 2
+    assert command_line.run(commands.app, arguments) == 2
     assert "small has no 'pear'; did you mean 'pair'?" in capsys.readouterr().err
-    assert command_line.run(app, [*arguments[:-1], "pair", "--half", "test"]) == 2
+    assert command_line.run(commands.app, [*arguments[:-1], "pair", "--half", "test"]) == 2
     assert "none of these scenes is in the test half" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
 
