@@ -243,6 +243,14 @@ def test_numbers_of_materials(tmp_path: Path) -> None:
     assert left_out[0] == "KHR_materials_sheen"
 
 
+def test_the_specular_factor_is_the_strength_of_highlights(tmp_path: Path) -> None:
+    """At normal incidence ((n - 1) / (n + 1))^2 times the factor."""
+    specular = {"KHR_materials_specular": {"specularFactor": 0.25}}
+    made, _ = material_of({"extensions": specular}, tmp_path)
+    n = made.finish.refractive_index
+    assert ((n - 1) / (n + 1)) ** 2 == pytest.approx(0.04 * 0.25, rel=1e-4)
+
+
 def test_pictures_are_split_and_multiplied(tmp_path: Path) -> None:
     draft = GltfDraft()
     colours = RNG.integers(0, 256, (4, 4, 3), dtype=np.uint8)
@@ -325,6 +333,19 @@ def test_pictures_lie_as_in_the_file(tmp_path: Path, transform: dict[str, Any], 
     view = render_view(built, grid, 0, 0, samples_per_pixel=64, seed=1)
     found = [[LETTERS[tuple((view[i, j] > 0.5 * view.max()).tolist())] for j in (1, 2)] for i in (1, 2)]
     assert " ".join("".join(row) for row in found) == seen
+
+
+def test_a_glow_needs_a_place_for_each_pixel(tmp_path: Path) -> None:
+    fan = np.vstack([QUAD, [(0, 0, 0)]]).astype("<f4")
+    faces = np.array([0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4], "<u2")
+    layouts = {"once": [*QUAD_UV, (0.5, 0.5)], "twice": [(0, 0), (1, 0), (0, 0), (1, 0), (0.5, 1)]}
+    for name, uv in layouts.items():
+        draft = GltfDraft()
+        glow = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": draft.texture(png(QUARTERS))}}
+        draft.node(mesh=draft.mesh(fan, faces, np.array(uv, "<f4"), glow), translation=[0, 0, -4])
+        scene, left_out = imported(draft, tmp_path / name, place_at_mm=(0.0, 0.0, 600.0))
+        assert (scene.objects[0].material.emission is not None) == (name == "once")
+        assert any("shine" in what for what in left_out) == (name == "twice")
 
 
 def test_parts_of_a_mesh_are_objects_named_by_their_materials(tmp_path: Path) -> None:
