@@ -1,4 +1,4 @@
-"""Opacity: holes that an image cuts are holes to rays, truth and photons, where the image says."""
+"""Opacity: holes that an image cuts are holes to rays and truth, where the image says."""
 
 from pathlib import Path
 from typing import Any

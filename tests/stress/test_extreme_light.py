@@ -107,9 +107,6 @@ def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | 
         np.testing.assert_allclose(sections.variance[0][where], exact, rtol=8 * ulp, atol=1e-25)
 
 
-# Photons of light
-
-
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize(
     ("value", "dtype"),
@@ -120,12 +117,6 @@ def test_photons_do_not_depend_on_the_unit_of_light(value: float, dtype: type, c
     found = pcii.limit_photons(constant(value, dtype, channels), 1000, seed=6)
     assert abs(found.total - expected.total) <= 2  # a rate may be rounded over a Poisson step
     assert abs(found.total - 4000) < 5 * np.sqrt(4000)
-
-
-# Pictures
-
-
-# Depth does not depend on the unit of radiance
 
 
 @pytest.mark.parametrize("method", ["posterior", "structure-tensor", "variance-sweep"])

@@ -23,9 +23,6 @@ def film_of(grid: pcii.CameraGrid, seed: int) -> np.ndarray:
     return rng.poisson(rng.choice([0.05, 1.0, 1e4]), grid.shape_KLHW)
 
 
-# What is accepted
-
-
 @given(nst.arrays(np.float64, (2, 3, 4, 5, 1), elements=st.floats(width=64)), DEPTHS)
 def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: float) -> None:
     try:
@@ -38,9 +35,6 @@ def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: f
     assert np.isfinite(sections.estimate).all()
     assert np.isfinite(sections.variance).all()
     assert (sections.variance >= 0).all()
-
-
-# Photons
 
 
 @given(SEEDS, st.sampled_from([*PATTERNS, None]), st.floats(1e-3, 1e12), st.integers(-1000, 900))
@@ -76,9 +70,3 @@ def test_samples_of_windows_are_those_of_fractions(seed: int, cell: int, window:
         if seen:
             np.testing.assert_allclose(found.mean[y, x], float(sum(seen) / len(seen)), rtol=4e-16)
             np.testing.assert_allclose(found.variance[y, x], float(variance_of(seen)), rtol=1e-14)
-
-
-# Sections
-
-
-# Scores

@@ -14,9 +14,6 @@ SEEDS = st.integers(0, 2**63 - 1)
 SHARES = st.floats(0, 1)
 
 
-# The sensor
-
-
 @given(SEEDS, st.integers(1, 10**12), st.integers(1, 9), st.integers(-290, 290))
 def test_a_scene_s_budget_is_shared_out_to_the_last_photon(seed, budget, views, power) -> None:
     energies = np.random.default_rng(seed).uniform(0, 1, (views, 1)) * 10.0**power
@@ -27,9 +24,6 @@ def test_a_scene_s_budget_is_shared_out_to_the_last_photon(seed, budget, views, 
     none = fixed_totals(photons, 0 * energies, np.random.default_rng(seed))
     assert none is not None
     assert not none.any()
-
-
-# Cameras
 
 
 @given(grids, st.floats(-20, 20), st.floats(-20, 20), st.floats(1, 1e5))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lit_scenes import DEPTH, two_balls
+from lit_scenes import DEPTH, EVENLY, card, lit, two_balls
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
@@ -26,19 +26,8 @@ LENS = Lens(aperture_mm=20.0, focus_mm=600.0)
 
 def dot(point_mm: tuple[float, float, float], side_mm: float = SIDE_MM) -> RenderScene:
     """A small white card, evenly lit, before a black wall."""
-    card = {
-        "name": "dot",
-        "position_mm": point_mm,
-        "shape": {"type": "card", "width_mm": side_mm, "height_mm": side_mm},
-        "material": {"reflectance": [1, 1, 1]},
-    }
-    values = {
-        "title": "dot",
-        "objects": [card],
-        "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}],
-        "backdrop": {"z_mm": 3000.0, "reflectance": [0, 0, 0]},
-    }
-    return build(backend.load(), Scene.model_validate(values), Path(), 2)
+    thing = card("dot", point_mm[2], side_mm, at_mm=point_mm[:2])
+    return lit([thing], [EVENLY], {"z_mm": 3000.0, "reflectance": (0, 0, 0)}, depth=2)
 
 
 def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonTable:

@@ -20,8 +20,8 @@ def scene() -> RenderScene:
     return two_balls()
 
 
-def seen(built: RenderScene, samples: int, seed: int, independent: bool = False) -> np.ndarray:
-    image = render_view(built, GRID, 0, 0, samples_per_pixel=samples, seed=seed, independent=independent)
+def seen(built: RenderScene, samples: int, seed: int) -> np.ndarray:
+    image = render_view(built, GRID, 0, 0, samples_per_pixel=samples, seed=seed)
     return sense(image, "GRBG").astype(np.float64)
 
 

@@ -126,6 +126,16 @@ def test_counts_fit_the_rendered_rates_pixel_by_pixel_and_tile_by_tile(
     assert stats.chi2.sf(chi_square(tilted), pooled.size) < 1e-6
 
 
+def test_totals_are_poisson(repeated: np.ndarray) -> None:
+    def dispersion(totals: np.ndarray) -> float:
+        return float(stats.chi2.sf(((totals - 1500) ** 2 / 1500).sum(), totals.size))
+
+    totals = repeated.sum(axis=(2, 3)).ravel()
+    assert 1e-3 < dispersion(totals) < 1 - 1e-3
+    assert dispersion(np.full(totals.size, 1500)) > 1 - 1e-3  # the fault: as many each time
+    assert dispersion(totals + 150) < 1e-3
+
+
 def test_there_is_no_rendering_noise_in_the_counts(
     scene: RenderScene, repeated: np.ndarray, radiance: np.ndarray
 ) -> None:

@@ -8,11 +8,10 @@ from simgen.renderer import backend, streams_for
 pytestmark = pytest.mark.skipif(
     backend.choose().kind == "scalar", reason="scalar mode has the numbers of NumPy and of Mitsuba"
 )
-LANES, DRAWS = 4096, 32
 WORD = (1 << 64) - 1
 
 
-def drawn(seed: int, part: int = 0, lanes: int = LANES, draws: int = DRAWS) -> np.ndarray:
+def drawn(seed: int, part: int, lanes: int, draws: int) -> np.ndarray:
     """Numbers (draw, lane), uint32."""
     stream = streams_for(backend.load(), seed, lanes, part=part).generator
     numbers = [stream.next_uint32() for _ in range(draws)]

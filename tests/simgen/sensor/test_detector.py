@@ -301,6 +301,13 @@ def test_no_pixel_tells_more_than_its_full_well_or_less_than_nothing() -> None:
     assert (told(even(0.0), FullLight(read_noise_e=0.0)) == 0).all()
 
 
+def test_the_variance_of_reading_is_that_of_its_noise() -> None:
+    electrons = told(even(40.0), FullLight(read_noise_e=40.0)).astype(np.float64) * GAIN
+    variance = 800 + 40.0**2 + (10_000 / 4095) ** 2 / 12
+    # Standard error of the variance of n nearly normal numbers.
+    assert abs(electrons.var() / variance - 1) < 4 * np.sqrt(2 / SIDE**2)
+
+
 def test_the_converter_tells_the_nearest_of_its_steps() -> None:
     # A well so deep that the photons' own noise, 1e-4 of it, is far less than a step of a seventh.
     light = FullLight(full_well_e=1e8, read_noise_e=0.0, adc_bits=3)
