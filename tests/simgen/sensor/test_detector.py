@@ -213,6 +213,9 @@ def test_dead_pixels_never_count() -> None:
     assert silent(counts + counted(dark)).sum() < 30  # the fault: dark counts in dead pixels
     another = silent(counted(detect(arrivals, GRID, "GRBG", dead, seed=4)))
     assert (another != silent(counts)).any()
+    both = Sensor(dead_pixel_share=0.5, hot_pixel_share=0.5, hot_pixel_counts=50.0)
+    dark = counted(detect(DARKNESS, GRID, "GRBG", both, seed=1))
+    assert silent(dark).sum() == 1500  # others are dead than are hot
 
 
 def companions(n: list[int]) -> PhotonTable:

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from pcii.types import CameraGrid
-from simgen.sensor import PhotonTable, counts_of, detector, read_out
+from simgen.sensor import PhotonTable, counts_of, detector, joined, read_out
 from simgen.spec import Sensor
 
 FILM = CameraGrid(rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.1, height=200, width=250)
@@ -97,6 +97,12 @@ def test_every_pixel_and_frame_stops_by_itself(rate: float, bits: int, known: bo
     np.testing.assert_array_equal(sums(unlimited), sums(arrivals))
     only_sums = read_out(arrivals, FILM, Sensor(frames=6, bits=bits), 3)
     np.testing.assert_array_equal(sums(only_sums), expected.sum(axis=1))
+
+
+def test_lumps_of_a_pixel_stop_together() -> None:
+    n = np.random.default_rng(1).poisson(6.0, PIXELS)
+    lumps = joined([arriving(n // 2, known=False), arriving(n - n // 2, known=False)])
+    np.testing.assert_array_equal(sums(read_out(lumps, FILM, Sensor(bits=2), seed=1)), np.minimum(n, 3))
 
 
 def test_parts_of_the_work_are_one_draw(monkeypatch: pytest.MonkeyPatch) -> None:
