@@ -36,11 +36,13 @@ def test_views_overlap_by_hand() -> None:
 
 @pytest.mark.parametrize("cfa", ["GRBG", "RGGB", "BGGR", "GBRG"])
 @pytest.mark.parametrize("pixels", [0.5, 1.0, 2.3, 2.5, 4.0])  # a half pixel is the hard case
-def test_missing_colours_are_those_of_the_reconstruction(cfa: str, pixels: float) -> None:
-    grid, z = at_disparity(pixels, rows=3, cols=5, shear_px=(0.3, -1.0))
+def test_missing_colours_and_overlap_are_those_of_the_reconstruction(cfa: str, pixels: float) -> None:
+    grid, z = at_disparity(pixels, rows=3, cols=5, shear_px=(0.3, -0.7))
     empty = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, int), grid, cfa=cfa)
-    middle = reconstruct(empty, z_mm=z).coverage[0, 16:18, 16:18]  # rows and columns 0 and 1 modulo 2
+    coverage = reconstruct(empty, z_mm=z).coverage[0]
+    middle = coverage[16:18, 16:18]  # rows and columns 0 and 1 modulo 2
     np.testing.assert_array_equal(shares_without(grid, cfa, z), (middle == 0).mean(axis=(0, 1)))
+    assert share_seen_by_all(grid, z) == pytest.approx((coverage.sum(axis=-1) == grid.view_count).mean())
 
 
 def test_even_shifts_leave_colours_out_and_another_pitch_mends_it() -> None:

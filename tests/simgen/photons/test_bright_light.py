@@ -10,6 +10,7 @@ import pytest
 import pcii
 import simgen
 from pcii.base import InputError
+from pcii.types import project_px
 from simgen.renderer import RenderScene, backend, build, render_view
 
 pytestmark = pytest.mark.renders
@@ -108,7 +109,7 @@ def test_the_dot_of_a_spot_lamp_has_its_light(cutoff_deg: float) -> None:
     counts, _ = simgen.draw_photons(scene, GRID, budget=4000, seed=1, cfa=None, max_depth=2)
     i, j = np.indices((GRID.height, GRID.width))
     for l in range(GRID.cols):
-        row, col = pcii.types.project_px(GRID, (10, 5, 500), 0, l)
+        row, col = project_px(GRID, (10, 5, 500), 0, l)
         near, view = np.hypot(i - row, j - col) < radius_mm / 500 * FOCAL_PX + 1.5, counts.dense[0, l]
         # The dot gives a film `PIXELS`, the surroundings give each of its pixels the wall's reflectance.
         expected = (1 + REFLECTANCE * near.mean()) / (1 + REFLECTANCE)
