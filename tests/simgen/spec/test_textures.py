@@ -72,6 +72,16 @@ def test_upright_stripes_start_with_the_first_colour_and_a_sine_is_a_sine() -> N
     np.testing.assert_allclose(sine[5], expected, atol=1e-6)
 
 
+def test_turned_stripes_are_mixed_by_area() -> None:
+    """Against a raster of 32 x 32 points a pixel, which is off by a row of them where a border crosses it."""
+    side, fine = 24, 32
+    share = share_of_second(Stripes(periods=5, angle_deg=30, pixels=side))
+    axis = (np.arange(side * fine) + 0.5) / (side * fine) - 0.5
+    cycles = 2.5 + 5 * (axis * math.cos(math.radians(30)) + axis[:, None] * math.sin(math.radians(30)))
+    many = (np.sin(2 * np.pi * cycles) < 0).reshape(side, fine, side, fine).mean((1, 3))
+    np.testing.assert_allclose(share, many, atol=1 / fine)
+
+
 @pytest.mark.parametrize(("angle_deg", "aspect"), [(5.0, 1.0), (-12.0, 1.6), (40.0, 1.0)])
 def test_the_slanted_edge_lies_where_its_angle_puts_it(angle_deg: float, aspect: float) -> None:
     share = share_of_second(Edge(angle_deg=angle_deg, pixels=200), aspect)
