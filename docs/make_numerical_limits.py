@@ -103,8 +103,7 @@ stress`.
   their magnitudes; float32 and float16 views give float32 sections, rounded once, 6 × 10^−8.
 * Variances of radiance are of the differences from a voxel's first sample. With a mean of 10^6 standard
   deviations they are right to 10^−9, and so are the standard deviations of NIST's reference data (NumAcc1
-  to 4, PiDigits, Lottery and others) to 8 digits or more. Numbers that float32 cannot hold, such as 10 000
-  000.2, must be given as float64.
+  to 4) to 8 digits or more. Numbers that float32 cannot hold, such as 10 000 000.2, must be given as float64.
 * Variances over views in windows, which `segment` uses, are in double precision and exact where the sum of
   squared differences times the number of views is below 2^53.
 * Depth from radiance does not depend on the unit of radiance.

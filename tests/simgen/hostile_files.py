@@ -48,12 +48,9 @@ def obj(*lines: str) -> bytes:
     return "\n".join(["v 0 0 0", "v 10 0 0", "v 0 10 0", "f 1 2 3", *lines, ""]).encode()
 
 
-def png(
-    *, width: int = 4, height: int = 4, bits: int = 8, kind: int = 2, extra: bytes = b"", data: bytes = b""
-) -> bytes:
-    """A PNG file with this header, whatever its pixels are."""
-    pixels = data or zlib.compress(bytes(height * (1 + width * 3)) if width * height < 1 << 20 else b"")
-    return png_file(width, height, bits, kind, pixels, extra)
+def png(side: int = 4, data: bytes = b"") -> bytes:
+    """A square PNG file with this header, whatever its pixels are."""
+    return png_file(side, side, 8, 2, data or zlib.compress(bytes(side * (1 + side * 3))), b"")
 
 
 def picture(mode: str, form: str) -> bytes:

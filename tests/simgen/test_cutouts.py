@@ -1,11 +1,11 @@
-"""Opacity: holes that an image cuts are holes to rays, truth and photons, where the image says."""
+"""Opacity: holes that an image cuts are holes to rays and truth, where the image says."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, made, seen, surprise, thinned
+from lit_views import card, film, made
 from PIL import Image
 from scipy.ndimage import label
 
@@ -15,7 +15,6 @@ from simgen.spec import Material
 from simgen.truth import first_hits_at_centre
 
 SKY = {"type": "uniform", "luminance_cd_m2": 1.0}
-GRID = film()
 
 
 def area(mesh: Triangles | None) -> float:
@@ -109,19 +108,6 @@ def test_no_ray_slips_between_the_pieces(tmp_path: Path, scale: int) -> None:
     sizes = sizes[sizes > 0]
     assert len(sizes) > 10
     assert sizes.min() > 0.5 * np.median(sizes)
-
-
-@pytest.mark.renders
-@pytest.mark.skipif(SCALAR, reason="takes minutes without a compiled backend")
-def test_photons_pass_holes(tmp_path: Path) -> None:
-    Image.fromarray((disc(32, 0.2) > 0.5).astype(np.uint8) * 255).save(tmp_path / "a.png")
-    lamp = {"type": "point", "position_mm": (80.0, -60.0, 100.0), "intensity_cd": 1.0}
-    wall = card(500.0, 600.0, {"reflectance": [0.6] * 3})
-    built = made([leaf({}), wall], [lamp], max_depth=3, folder=tmp_path)
-    view = seen(built, GRID, 1024)
-    gain = 20_000 / view.mean() / GRID.height / GRID.width
-    photons, _ = thinned(built, GRID, 3, gain=gain)
-    assert abs(surprise(photons, view, GRID, gain)) < 4
 
 
 @pytest.mark.renders

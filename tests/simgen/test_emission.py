@@ -1,6 +1,5 @@
 """Objects that shine: as an area light of the same size does, by colour and image, and photon by photon."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,25 +9,15 @@ from lit_views import SCALAR, card, film, made, seen, surprise, thinned
 from PIL import Image
 
 from pcii.base import LUMINANCE, InputError, srgb_to_linear
-from simgen.assets import Assets
 from simgen.renderer import backend
-from simgen.renderer.emission import object_lux
 from simgen.renderer.mitsuba_surfaces import light_spectrum
-from simgen.spec import Scene
 from simgen.spectral import illuminant, integral, observer
-from simgen.spectral.spectra import FROM_XYZ
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GRID = film()
 WALL = card(500.0, 600.0, {"reflectance": [0.6] * 3})
 BLACK = [0.0, 0.0, 0.0]
 L = 1000.0
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def shining(shape: dict[str, Any], emission: dict[str, Any], **more: Any) -> dict[str, Any]:
@@ -64,14 +53,10 @@ def test_a_card_that_shines_is_an_area_light() -> None:
 
 
 @pytest.mark.skipif(SCALAR, reason="takes minutes without a compiled backend")
-@pytest.mark.parametrize("kind", ["card", "ball", "mesh with normals"])
-def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
-    thing = PANEL
-    if kind == "ball":
-        thing = shining({"type": "sphere", "radius_mm": 30.0}, {"illuminant": [1.0, 0.6, 0.3]})
-    if kind == "mesh with normals":
-        write_octahedron(tmp_path / "lamp.ply")
-        thing = shining({"type": "mesh", "file": "lamp.ply", "scale": [40.0, 40.0, -60.0]}, {})
+def test_photons_of_a_mesh_with_normals_follow_the_image(tmp_path: Path) -> None:
+    write_octahedron(tmp_path / "lamp.ply")
+    mesh = {"type": "mesh", "file": "lamp.ply", "scale": [40.0, 40.0, -60.0]}
+    thing = shining(mesh, {"illuminant": [1.0, 0.6, 0.3]})
     # In sight, so that its own light is among what is counted.
     thing = thing | {"position_mm": (60.0, -120.0, 450.0)}
     built = made([WALL, thing], [], max_depth=3, folder=tmp_path)
@@ -92,12 +77,7 @@ def write_octahedron(path: Path) -> None:
 
 
 def test_the_level_counts_what_shines() -> None:
-    """A ball of radius r and radiance L gives a plane at distance d that faces it pi L (r / d)^2."""
-    ball = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, 200.0)}
-    thing = Scene.model_validate({"title": "t", "objects": [ball]}).objects[0]
-    lux = object_lux(backend.load(), thing, 500.0, Assets())
-    assert lux == pytest.approx(np.pi * L * (50 / 300) ** 2, rel=1e-3)
-    # Before the cameras, behind them it lights the wall.
+    """A ball behind the cameras lights the wall."""
     behind = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, -200.0)}
     level = {"illuminance_lux": 300.0, "z_mm": 500.0}
     view = seen(made([WALL, behind], [], level=level), GRID, 256)
@@ -133,7 +113,8 @@ def test_the_spectrum_of_a_colour_has_it(colour: tuple[float, float, float]) -> 
     rgb = srgb_to_linear(np.array(colour))
     seen_as = integral(observer() * spectrum)
     assert seen_as[1] == pytest.approx(integral(observer()[1] * illuminant("D65")))
-    found = FROM_XYZ @ seen_as
+    # From CIE XYZ to linear sRGB, as in IEC 61966-2-1.
+    found = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]] @ seen_as
     np.testing.assert_allclose(found / found.max(), rgb / rgb.max(), atol=0.02)
 
 

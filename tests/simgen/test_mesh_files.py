@@ -10,8 +10,8 @@ from hostile_files import ply, scene_toml
 from PIL import Image, ImageOps
 from png_files import png16
 
+from pcii.base import srgb_to_linear
 from simgen.assets import Triangles, ply_bytes, read_assets, read_mesh
-from simgen.assets.asset_files import srgb_to_linear
 from simgen.spec import load_scene
 
 # A roof: a square and a triangle that share two corners.
@@ -126,7 +126,7 @@ def image_of(folder: Path, name: str) -> np.ndarray:
     return read_assets(*load_scene(str(folder))).image(name)
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("channels", [1, 2, 3])
 def test_16_bits_are_kept(channels: int, tmp_path: Path) -> None:
     pixels = np.random.default_rng(3).integers(0, 1 << 16, (5, 7, channels))
     colours = pixels
@@ -140,7 +140,7 @@ def test_16_bits_are_kept(channels: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("mode", "name"),
-    [*((mode, "a.png") for mode in ("1", "L", "P", "RGB", "RGBA")), ("L", "a.tif"), ("RGBA", "a.tif")],
+    [("1", "a.png"), ("P", "a.png"), ("RGBA", "a.png"), ("L", "a.tif")],
 )
 def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     image = Image.new("RGB", (3, 2), "white")
@@ -151,9 +151,7 @@ def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(pixels[..., 1], [[1, 1, 1], [1, 1, 0]])
 
 
-@pytest.mark.parametrize(
-    ("name", "orientation"), [*(("a.jpg", number) for number in range(2, 9)), ("a.png", 6), ("a.tif", 8)]
-)
+@pytest.mark.parametrize(("name", "orientation"), [("a.jpg", 2), ("a.jpg", 5), ("a.png", 6), ("a.tif", 8)])
 def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tmp_path: Path) -> None:
     exif = Image.Exif()
     exif[0x0112] = orientation
@@ -172,8 +170,3 @@ def test_tiff_of_any_bits_is_as_bright(bits: int, tmp_path: Path) -> None:
     expected = srgb_to_linear(numbers / ((1 << bits) - 1))
     half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
     np.testing.assert_allclose(image_of(tmp_path, "a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step)
-
-
-def test_a_picture_of_one_pixel_is_a_texture(tmp_path: Path) -> None:
-    Image.new("RGB", (1, 1), (255, 0, 0)).save(tmp_path / "a.png")
-    np.testing.assert_array_equal(image_of(tmp_path, "a.png"), [[[1, 0, 0]]])

@@ -12,7 +12,7 @@ from pcii.base import command_line
 from pcii.store import open_dataset, save_dataset
 from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 from simgen.app import commands as cli
-from simgen.app.pictures import draw_sheet, part_of_interest, photon_tiles
+from simgen.app.pictures import draw_sheet
 
 
 def assert_shows_something(path: Path) -> None:
@@ -33,14 +33,14 @@ def grid(**changes: Any) -> CameraGrid:
 def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Path) -> None:
     look, sheet = tmp_path / "look.jpg", tmp_path / "sheet.png"
     title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
-    command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "2", *title]
+    command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "1", *title]
     assert command_line.run(cli.app, command) == 0
     assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
     assert_shows_something(look)
     assert_shows_something(sheet)
 
 
-@pytest.mark.parametrize("shape", [(6, 6, 32, 32), (1, 12, 32, 32), (2, 2, 96, 40), (2, 3, 12, 200)])
+@pytest.mark.parametrize("shape", [(1, 12, 32, 32), (2, 3, 12, 200)])
 def test_a_sheets_panels_have_room_and_do_not_overlap(
     shape: tuple[int, int, int, int], tmp_path: Path
 ) -> None:
@@ -85,24 +85,3 @@ def test_pictures_are_refused_in_one_sentence(
     assert list(tmp_path.iterdir()) == []
     assert command_line.run(cli.app, ["sheet", str(tmp_path), "-o", str(tmp_path / "x.png")]) == 2
     assert "not a finished dataset" in capsys.readouterr().err
-
-
-def test_the_part_of_interest_keeps_the_films_aspect() -> None:
-    mask = np.zeros((100, 200), dtype=bool)
-    mask[40:50, 100:110] = True
-    rows, cols = part_of_interest(mask)  # with a margin of 6
-    assert (rows.start, rows.stop, cols.start, cols.stop) == (34, 56, 83, 127)
-    mask[0, 0] = True
-    rows, cols = part_of_interest(mask)
-    assert (rows.start, cols.start) == (0, 0)
-    assert rows.stop >= 50
-    assert cols.stop == 2 * rows.stop
-    assert part_of_interest(np.zeros((7, 9), dtype=bool)) == (slice(0, 7), slice(0, 9))
-
-
-def test_a_photon_lights_its_own_block_and_colour_in_its_view() -> None:
-    where = {"k": [1], "l": [1], "i": [10], "j": [21], "n": [4]}
-    counts = PhotonCounts.from_events(*map(np.array, where.values()), grid=grid(), cfa="GRBG")
-    tiles = photon_tiles(counts)  # 24 blocks along 60 pixels at the fewest, of 3 x 3 pixels
-    tiles[20:22], tiles[:, 14:16], tiles[:, 30:32] = 0, 0, 0  # the gaps
-    assert np.argwhere(tiles).tolist() == [[22 + 3, 16 + 7, 0]]

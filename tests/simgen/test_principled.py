@@ -1,12 +1,11 @@
 """The principled finish: the renderer's own with the same numbers, images for numbers, and energy."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, made, seen, surprise, thinned
+from lit_views import card, film, made, seen
 from PIL import Image
 
 from pcii.base import InputError, srgb_to_linear
@@ -19,12 +18,6 @@ COLOUR = (0.8, 0.5, 0.2)
 GRID = film()
 SAMPLES = 512
 DEPTH = 6
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def painted(finish: dict[str, Any], colour: tuple[float, ...] = COLOUR) -> dict[str, Any]:
@@ -98,9 +91,7 @@ def test_each_number_does_what_it_does_to_the_renderers_own(ours: dict, theirs: 
     assert np.abs(first / in_blocks(plain) - 1).max() > 5 * 2**0.5 / np.sqrt(16 * SAMPLES)
 
 
-@pytest.mark.parametrize(
-    ("metallic", "roughness"), [(0.0, 0.05), (0.0, 1.0), (0.5, 0.3), (1.0, 0.05), (1.0, 1.0)]
-)
+@pytest.mark.parametrize(("metallic", "roughness"), [(0.0, 0.05), (0.5, 0.3), (1.0, 1.0)])
 def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float) -> None:
     # White of no metal gains up to 10 % by the model, as docs/scenes.md says; a metal nothing at all.
     colour = (1.0,) * 3 if metallic == 1 else (0.95,) * 3
@@ -111,7 +102,7 @@ def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float
         assert in_blocks(view).max() < 1 + 5 * 0.5 / np.sqrt(4096)
 
 
-@pytest.mark.parametrize(("bits", "field"), [(8, "metallic"), (16, "roughness"), (8, "clearcoat")])
+@pytest.mark.parametrize(("bits", "field"), [(8, "metallic"), (16, "roughness")])
 def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int, field: str) -> None:
     most = 2**bits - 1
     dark, bright = round(0.2 * most), round(0.8 * most)
@@ -134,12 +125,3 @@ def test_a_coloured_image_of_numbers_is_named(tmp_path: Path) -> None:
     Image.fromarray(np.eye(3, dtype=np.uint8)[None] * 200).save(tmp_path / "coloured.png")
     with pytest.raises(InputError, match=r"object 'ball', material\.finish\.roughness: 'coloured\.png' is"):
         made([ball(painted({"roughness": "coloured.png"}))], [EVERYWHERE], folder=tmp_path)
-
-
-def test_photons_are_those_of_the_dense_view() -> None:
-    material = painted({"metallic": 0.3, "roughness": 0.3, "clearcoat": 0.5})
-    built = made([ball(material), card(600.0, 300.0, material)], [EVERYWHERE, LAMP], max_depth=3)
-    view = seen(built, GRID, 512 if SCALAR else 1024)
-    gain = (10_000 if SCALAR else 40_000) / view.sum()
-    photons, _ = thinned(built, GRID, 3, gain)
-    assert abs(surprise(photons, view, GRID, gain)) < 5

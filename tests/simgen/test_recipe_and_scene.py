@@ -13,6 +13,7 @@ from simgen.spec import Analysis, Recipe, Scene, load_recipe, load_scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 EXPOSED = {"f_number": 8.0, "time_s": 0.01}
+LENS = {"aperture_mm": 6.0, "focus_mm": 600.0}
 
 
 def scene_with(**thing: object) -> dict[str, Any]:
@@ -80,31 +81,24 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
         ({"grid": {"rows": 0}}, "'grid.rows': input should be greater than or equal to 1, got 0"),
         ({"grid": {"rows": 2.0}}, "'grid.rows': input should be a valid integer"),
         ({"grid": {"pitch_mm": [1, "1"]}}, "'grid.pitch_mm[1]': input should be a valid number"),
-        ({"grid": {"pitch_mm": [1e300, 5]}}, "'grid.pitch_mm[0]': input should be less than or equal to 1"),
         ({"grid": {"focal_mm": 1e-5}}, "focal_mm: 0.00180224 mm or more is needed"),
-        ({"grid": {"shear_px": [0, -1e300]}}, "'grid.shear_px[1]'"),
+        ({"grid": {"lens": LENS, "shear_px": (1.0, 0.0)}}, "leave out shear_px"),
+        (
+            {"grid": {"lens": LENS}, "exposure": EXPOSED},
+            "focal_mm / exposure.f_number is 6.25 mm, and aperture_mm is 6; make them agree",
+        ),
         ({"sensor": {"cfa": "GRGB"}}, "'GRBG', 'RGGB', 'BGGR', 'GBRG' or 'none', got 'GRGB'"),
-        ({"sensor": {"quantum_efficiency": [1, 0, 1]}}, "'sensor.quantum_efficiency[1]'"),
-        ({"sensor": {"bits": 33}}, "'sensor.bits'"),
         ({"sensor": {"full_light": {}}}, "exposure: photons.scope = 'exposure' and sensor.full_light need"),
         ({"photons": {"scope": "exposure"}}, "exposure: photons.scope = 'exposure' and sensor.full_light"),
         ({"photons": {"budget": float("nan")}}, "'photons.budget'"),
         ({"photons": {"budget": True}}, "'photons.budget': input should be a valid number"),
-        ({"photons": {"budget": 2e15}}, "'photons.budget': input should be less than or equal to"),
         ({"photons": {"nested": [300, 1000]}}, "nested: every budget must be less than budget = 1000"),
         ({"photons": {"nested": [300, 100, 300]}}, "nested: give each budget once"),
-        ({"photons": {"nested": [100, -5]}}, "'photons.nested[1]': input should be greater than 0"),
         ({"photons": {"statistics": "multinomial", "budget": 10.5}}, "budgets are whole numbers"),
-        ({"photons": {"statistics": "multinomial", "nested": [2.5]}}, "budgets are whole numbers"),
         (
             {"photons": {"scope": "exposure", "statistics": "multinomial"}, "exposure": EXPOSED},
             "scope: an exposure has no budget",
         ),
-        (
-            {"photons": {"scope": "exposure", "nested": [10]}, "exposure": EXPOSED},
-            "an exposure has no budget",
-        ),
-        ({"exposure": {"f_number": 0}}, "'exposure.f_number': input should be greater than 0, got 0"),
         ({"render": {"samples_per_pixel": 2048}}, "2147483648 paths; fewer than 2147483648"),
         ({"render": {"background_samples_per_pixel": 17}}, "expected at most samples_per_pixel"),
         ({"products": {"truth": False, "visibility": True}}, "visibility: it is counted for"),
@@ -139,21 +133,9 @@ def test_what_lies_just_within_the_limits_is_accepted(values: dict) -> None:
             scene_with(shape={"type": "sphere", "radius": 5}),
             "'objects[0].shape.radius'; did you mean 'radius_mm'",
         ),
-        (
-            scene_with(shape={"type": "mesh", "file": "a.ply", "scale": 1e200}),
-            "shape.scale': input should be less than",
-        ),
-        (
-            scene_with(shape={"type": "mesh", "file": "a.ply", "scale": 0}),
-            "shape.scale': input should be greater than 0",
-        ),
         (scene_with(shape={"type": "mesh", "file": "a.ply", "scale": [1, 0, 1]}), "a scale is not 0"),
         (scene_with(material={}), "'objects[0].material': give either 'reflectance' or 'texture'"),
-        (scene_with(material={"reflectance": [1, 2, 0]}), "'objects[0].material.reflectance[1]'"),
         (scene_with(name="../x"), "'objects[0].name': string should match pattern"),
-        (scene_with(name="ball\n"), "'objects[0].name'"),
-        (scene_with() | {"title": "two\nlines"}, "'title': a title is one line"),
-        ({"title": "t", "lights": []}, "'lights'"),
         (scene_with() | {"objects": scene_with()["objects"] * 2}, "two objects are named 'a'"),
         (
             {"title": "t", "lights": [LIGHT, {"type": "environment", "file": "a.exr", "luminance_cd_m2": 1}]},
@@ -166,15 +148,7 @@ def test_what_lies_just_within_the_limits_is_accepted(values: dict) -> None:
         (textured({"type": "cheks"}), "material.texture.type': there is no 'cheks'; did you mean 'checks'?"),
         (textured({"type": "zebra"}), "no 'zebra'; known are checks, edge, noise, star, stripes, text"),
         (textured({"spokes": 3}), "'objects[0].material.texture.type' is missing"),
-        (textured(7), "'objects[0].material.texture': input should be a valid dictionary"),
-        (textured({"type": "text"}), "'objects[0].material.texture.text' is missing"),
-        (textured({"type": "text", "text": "a\nb"}), "texture.text': printable Latin-1 characters"),
-        (
-            textured({"type": "text", "text": "Ω"}),
-            "printable Latin-1 characters, not only spaces, can be drawn",
-        ),
-        (textured({"type": "text", "text": "  "}), "printable Latin-1 characters, not only spaces"),
-        (textured({"type": "edge", "colours": [[0, 0, 0], [0, 2, 0]]}), "material.texture.colours[1][1]'"),
+        (textured({"type": "text", "text": "Ω"}), "printable Latin-1 characters, not only spaces"),
         (textured({"type": "noise", "contrast": 0.44}), "contrast: 0.44 puts more than 1% of the values"),
     ],
 )

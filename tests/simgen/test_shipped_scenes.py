@@ -14,8 +14,7 @@ from PIL import Image
 
 from simgen.check import coarser, load_target
 from simgen.renderer import backend, build
-from simgen.spec import Grid, Light, Scene, Shape, Spectrum, Texture, load_recipe, load_scene
-from simgen.spec.materials import Finish
+from simgen.spec import Grid, Light, Material, Scene, Shape, Spectrum, Texture, load_recipe, load_scene
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,7 +92,9 @@ def test_the_scenes_show_all_that_scenes_can_hold() -> None:
     things = [thing for scene in scenes for thing in scene.objects]
     textures = [thing.material.texture for thing in things]
     assert {thing.shape.type for thing in things} == kinds(Shape)
-    assert {thing.material.finish.type for thing in things} == kinds(Finish)
+    assert {thing.material.finish.type for thing in things} == kinds(
+        Material.model_fields["finish"].annotation
+    )
     assert {getattr(texture, "type", None) for texture in textures} - {None} == kinds(Texture)
     assert {light.type for scene in scenes for light in scene.lights} == kinds(Light)
     assert {type(thing.material.reflectance) for thing in things} >= {tuple, str, Spectrum}

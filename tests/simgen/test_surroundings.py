@@ -1,6 +1,5 @@
 """Environment light: where what stands in the image is seen, how bright it is, and photons in the sun."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +9,12 @@ from lit_scenes import ball
 from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from simgen.renderer import backend
 from simgen.truth import first_hits_of_view
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVENLY = {"type": "uniform", "luminance_cd_m2": 1.0}
 WIDE = film(32, 32, focal_mm=10.0)
 """Sees 58 degrees to each side."""
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def longitude_and_latitude() -> tuple[np.ndarray, np.ndarray]:
@@ -131,18 +123,6 @@ def test_photons_in_the_sun_are_those_of_rendered_views(tmp_path: Path) -> None:
         assert log["paths_above_bound"] <= 1e-3 * photons.k.size
         # Followed by the surfaces' own scattering alone, a candidate in 25 would be kept.
         assert log["kept_share"] > 0.2
-
-
-@pytest.mark.skipif(SCALAR, reason="the renderer's own paths are followed in scalar mode")
-def test_photons_in_a_very_small_sun_do_not_take_forever(tmp_path: Path) -> None:
-    pixels = np.full((64, 128, 3), 0.3)
-    pixels[12, 8] = 5000  # one pixel in 8000 gives most of the light
-    built = made(THINGS, [sky(tmp_path, pixels)], max_depth=DEPTH, folder=tmp_path)
-    view = seen(built, film(), 512)
-    gain = 20_000 / view.sum() * 3
-    photons, log = thinned(built, film(), DEPTH, gain)
-    assert abs(surprise(photons, view, film(), gain)) < 5
-    assert log["kept_share"] > 0.2
 
 
 @pytest.mark.parametrize("kind", ["uniform", "environment"])

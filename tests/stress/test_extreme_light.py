@@ -11,7 +11,6 @@ import pcii
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)
-OPTICS = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
 MODES: list[dict[str, Any]] = [
     {},
     {"variance": True},
@@ -55,22 +54,6 @@ def test_a_constant_film_is_that_constant(value: float, dtype: type, options: di
     assert (sections.estimate[~reached] == 0).all()
     assert sections.variance is None or (sections.variance == 0).all()
     assert all(np.isfinite(array).all() for array in all_arrays(sections))
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("options", MODES)
-@pytest.mark.parametrize("z_mm", [FAR_MM, 0.2])  # where it is seen, and where it falls outside
-def test_what_is_no_number_is_refused_wherever_it_is(
-    value: float, options: dict[str, Any], z_mm: float
-) -> None:
-    for pixel in ((0, 0, 0, 0), (1, 1, 3, 3), (0, 1, 2, 1)):
-        light = np.ones((*GRID.shape_KLHW, 1), np.float32)
-        light[pixel] = value
-        for radiance in (light, Reader(light)):
-            with pytest.raises(pcii.InputError, match=r"^radiance: view \(\d, \d\) holds NaN or infinity"):
-                pcii.reconstruct(pcii.Views(radiance, GRID), z_mm, **options)
-    with pytest.raises(pcii.InputError, match=r"^radiance: "):
-        pcii.limit_photons(pcii.Views(light, GRID), 10, seed=0)
 
 
 @pytest.mark.parametrize("options", MODES)
@@ -124,9 +107,6 @@ def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | 
         np.testing.assert_allclose(sections.variance[0][where], exact, rtol=8 * ulp, atol=1e-25)
 
 
-# Photons of light
-
-
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize(
     ("value", "dtype"),
@@ -137,33 +117,6 @@ def test_photons_do_not_depend_on_the_unit_of_light(value: float, dtype: type, c
     found = pcii.limit_photons(constant(value, dtype, channels), 1000, seed=6)
     assert abs(found.total - expected.total) <= 2  # a rate may be rounded over a Poisson step
     assert abs(found.total - 4000) < 5 * np.sqrt(4000)
-
-
-def test_black_views_have_no_photons_and_bright_ones_are_refused() -> None:
-    assert pcii.limit_photons(constant(0.0), 1e12, seed=8).total == 0
-    with pytest.raises(pcii.InputError, match=r"^radiance: .*more light than can be added up"):
-        pcii.limit_photons(constant(1.7e308), 10, seed=8)
-    with pytest.raises(pcii.InputError, match=r"^radiance: view \(0, 0\) holds light below 0"):
-        pcii.limit_photons(constant(-1.0), 10, seed=8)
-
-
-# Pictures
-
-
-@pytest.mark.parametrize("value", [0.0, 5e-324, 1e300, 1.7e308, -5.0])
-@pytest.mark.parametrize("shape", [(2, 2), (5, 4)])
-def test_demosaicing_gives_finite_colours_or_refuses(value: float, shape: tuple[int, int]) -> None:
-    raw = np.full(shape, value)
-    try:
-        image = pcii.demosaic(raw)
-    except pcii.InputError as fault:
-        assert str(fault).startswith("mosaic: values are too large")  # noqa: PT017
-        assert value > 1e307
-        return
-    np.testing.assert_allclose(image, value, rtol=1e-12, atol=1e-322)
-
-
-# Depth does not depend on the unit of radiance
 
 
 @pytest.mark.parametrize("method", ["posterior", "structure-tensor", "variance-sweep"])
@@ -187,16 +140,3 @@ def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
     light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
     light[..., 0] = 1
     assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
-
-
-@pytest.mark.parametrize("encoding", ["srgb", "linear", 2.2, 10.0])
-@pytest.mark.parametrize(("value", "dtype"), [(6e4, np.float16), (3e38, np.float32), (1e300, np.float64)])
-def test_imported_light_is_finite_or_refused(value: float, dtype: type, encoding: Any) -> None:
-    numbers = np.full((1, 2, 2, 2), value, dtype)
-    try:
-        light = pcii.import_arrays(numbers, OPTICS, encoding=encoding).radiance
-    except pcii.InputError as fault:
-        words = "too bright for float32" if encoding == "linear" else "encoded light is 1 at white"
-        assert words in str(fault)  # noqa: PT017
-        return
-    assert np.isfinite(np.asarray(light)).all()

@@ -79,20 +79,6 @@ def test_a_pixel_holds_2_to_the_40_photons_however_they_come() -> None:
         pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), LARGEST_COUNT + 1), grid)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint32, np.uint64, np.float32, ">i4"])
-def test_counts_of_every_type_are_the_same(dtype: object) -> None:
-    grid = unit_grid(2, 2, 3, 5)
-    film = np.random.default_rng(1).integers(0, 100, grid.shape_KLHW)
-    optics = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
-    same = np.asarray(film).astype(dtype)  # type: ignore[arg-type]
-    for counts in (pcii.PhotonCounts.from_dense(same, grid), pcii.import_counts(same, optics)):
-        assert counts.total == film.sum()
-        np.testing.assert_array_equal(
-            pcii.reconstruct(counts, 1.0).counts,
-            pcii.reconstruct(pcii.PhotonCounts.from_dense(film, grid), 1.0).counts,
-        )
-
-
 @pytest.mark.parametrize("level", [10**3, 10**6, 10**9, 10**11])
 @pytest.mark.parametrize("differing", [False, True])
 def test_the_variance_over_views_is_right_in_bright_windows(level: int, differing: bool) -> None:

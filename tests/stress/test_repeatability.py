@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from twins import Reader
 
 import pcii
 
@@ -88,14 +87,3 @@ def test_one_thread_and_another_run_give_the_same_bits() -> None:
 def test_any_number_of_threads_gives_the_same_bits_of_larger_films(threads: int) -> None:
     """Films of 300 rows have many bands of rows, which are shared out unevenly."""
     assert results_of(threads, 300) == results_of(4, 300)
-
-
-@pytest.mark.parametrize("cfa", [None, "GBRG"])
-@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
-def test_views_in_memory_or_on_disk_give_the_same_sections(dtype: type, cfa: str | None) -> None:
-    """But for the order of the 12 sums: those on disk are read in batches."""
-    light = np.random.default_rng(2).normal(3, 1, (*GRID.shape_KLHW, 1)).astype(dtype)
-    one, two = (pcii.reconstruct(pcii.Views(r, GRID, cfa), [400, 500]) for r in (light, Reader(light)))
-    tolerance = 12 * 1.2e-16 if dtype is np.float64 else 1.2e-7
-    np.testing.assert_allclose(one.counts, two.counts, rtol=tolerance)
-    np.testing.assert_array_equal(one.coverage, two.coverage)

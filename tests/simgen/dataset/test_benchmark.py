@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,9 @@ from small_benchmark import SCENE, written
 import pcii
 from pcii.base import InputError, command_line
 from pcii.store import CARD, CROISSANT, INDEX, LICENCE, hash_file, hash_json, verify
-from simgen.app.commands import app
+from simgen.app import commands
 from simgen.dataset import CERTIFICATE, Definition, certify, load_definition, make_benchmark
-from simgen.dataset.benchmark_making import BenchmarkSeries, benchmark_files, compare, published_certificate
+from simgen.dataset.benchmark_making import BenchmarkSeries, compare
 
 pytestmark = pytest.mark.renders
 
@@ -25,8 +24,9 @@ def made(small_benchmark: Path) -> tuple[Definition, Path, Path]:
     return *written(small_benchmark.parent), small_benchmark
 
 
-def contents(file: Path) -> dict[str, Mapping[str, Any]]:
-    return published_certificate(file)["datasets"]
+def published_certificate(file: Path) -> dict[str, Any]:
+    """The certificate that lies beside a definition."""
+    return json.loads(file.with_suffix(f".{CERTIFICATE}").read_text())
 
 
 def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definition, Path, Path]) -> None:
@@ -68,7 +68,7 @@ def test_making_it_in_two_steps_gives_the_published_bytes(
 
 
 def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Definition, Path, Path]) -> None:
-    published = contents(made[1])
+    published = published_certificate(made[1])["datasets"]
     first, second = published["pair_photons_2"], published["pair_photons_3"]
     verdict = compare({"x": first}, {"x": second})
     assert (verdict.same_bytes, verdict.problems) == (0, ())
@@ -84,7 +84,6 @@ def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Def
         ({"seeds": []}, "seeds: expected at least one, each once"),
         ({"photons_per_view": [300, 30]}, "photons_per_view: expected growing numbers"),
         ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "scene: expected a name of its own"),
-        ({"scene": [SCENE | {"name": "A B"}]}, r"scene\[0\]\.name"),
     ],
 )
 def test_bad_definitions_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
@@ -96,16 +95,15 @@ def test_scenes_that_are_not_there_are_named(
     made: tuple[Definition, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["benchmark", "make", str(made[1]), "-o", str(tmp_path / "x"), "--scene", "pear"]
-    assert command_line.run(app, arguments) == 2
+    assert command_line.run(commands.app, arguments) == 2
     assert "small has no 'pear'; did you mean 'pair'?" in capsys.readouterr().err
-    assert command_line.run(app, [*arguments[:-1], "pair", "--half", "test"]) == 2
+    assert command_line.run(commands.app, [*arguments[:-1], "pair", "--half", "test"]) == 2
     assert "none of these scenes is in the test half" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
 
 
 def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves() -> None:
     definition, file = load_definition("pcii-bench-1")
-    assert file == benchmark_files()["pcii-bench-1"]
     halves = [scene.half for scene in definition.scene]
     assert (len(halves), halves.count("test")) == (24, 12)
     assert len({scene.kind for scene in definition.scene}) == 7

@@ -14,7 +14,6 @@ from pcii.base import Executor, InputError, WorkerLostError, command_line, locke
 from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, software, verify
 from simgen.app import commands as cli
 from simgen.dataset import dataset_collection, generate, generate_collection
-from simgen.dataset.dataset_collection import DatasetJob
 from simgen.spec import Sweep, load_recipe, load_sweep
 
 pytestmark = pytest.mark.renders
@@ -103,16 +102,6 @@ def test_a_dataset_that_cannot_be_made_holds_up_no_other(
     assert [row["seed"] for row in open_collection(out).rows] == [7, 9]
 
 
-def test_a_sweep_that_made_nothing_gives_way_to_the_one_that_was_meant(
-    recipe_file: Path, tmp_path: Path
-) -> None:
-    drawn = ["scene=drawn_crossing"]
-    assert len(generate_collection(load_sweep(str(recipe_file), drawn), tmp_path / "out")) == 2
-    meant = load_sweep(str(recipe_file), [*drawn, "scene_number=3"])
-    assert generate_collection(meant, tmp_path / "out") == []
-    assert [row["scene_number"] for row in open_collection(tmp_path / "out").rows] == [3, 3]
-
-
 def test_a_collection_that_another_run_writes_is_refused(recipe_file: Path, tmp_path: Path) -> None:
     with (
         locked(tmp_path / dataset_collection.LOCK, tmp_path),
@@ -138,42 +127,13 @@ def test_another_recipe_a_dataset_and_a_file_are_refused(
         generate(recipe, near, collection)
 
 
-def test_the_same_recipe_written_otherwise_is_the_same_collection(collection: Path, tmp_path: Path) -> None:
-    other, before = tmp_path / "other.toml", (collection / COLLECTION).read_bytes()
-    grid = "\n".join(reversed(GRID_2_X_3.strip().splitlines()[1:]))
-    other.write_text(
-        'seed = { range = [7, 10] } # as with --seeds 3\nscene = "plain_pair"\ntitle = ""\n'
-        f"[photons]\nbudget = {{ each = [100, 200] }}\nscope = 'view'\n[grid]\nfocal_mm = 50\n{grid}"
-    )
-    assert generate_collection(load_sweep(str(other)), collection) == []
-    assert (collection / COLLECTION).read_bytes() == before
-    assert len(open_collection(collection)) == 6
-
-
-def test_other_software_neither_extends_a_collection_nor_works_on_it(
-    recipe_file: Path, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_other_software_does_not_extend_a_collection(
+    recipe_file: Path, collection: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    job, original = DatasetJob(sweep_of(recipe_file), tmp_path), software.version
+    original = software.version
     monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)
-    with pytest.raises(InputError, match=r"other software.* \(mitsuba .* is now 9\.9\).* install"):
-        job(0)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_verification_says_what_is_unfinished_and_what_belongs_to_nothing(
-    collection: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "stopped"
-    shutil.copytree(collection, out)
-    (out / "budget_100_seed_10").mkdir()
-    (out / "budget_100_seed_10" / MARKER).write_text("{}")
-    with pytest.raises(InputError, match=r"not listed in index.jsonl: budget_100_seed_10; repeat"):
-        verify(out)
-    (out / "mine").mkdir()
-    with pytest.raises(InputError, match=r"not listed in index.jsonl: budget_100_seed_10, mine;"):
-        verify(out)
 
 
 def test_the_same_command_goes_on_to_the_same_bytes_after_a_worker_was_killed(

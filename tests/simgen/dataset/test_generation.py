@@ -131,24 +131,6 @@ def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.Monkey
     assert (made / MANIFEST).stat().st_mtime_ns == before
 
 
-def test_another_run_may_look_at_it_the_moment_it_is_finished(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It saw an unfinished dataset, and marks the folder once more before it finds the manifest."""
-    out, original = tmp_path / "looked_at", Path.unlink
-
-    def marked_again(path: Path, *, missing_ok: bool = False) -> None:
-        original(path, missing_ok=missing_ok)
-        if path.name == MARKER:
-            path.touch()
-
-    monkeypatch.setattr(Path, "unlink", marked_again)
-    generate(recipe(), Path(), out)
-    monkeypatch.undo()
-    generate(recipe(), Path(), out)  # the other run
-    assert digest(out) == digest(made)
-
-
 def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with (tmp_path / "out" / MARKER).open("a") as file:
@@ -171,14 +153,6 @@ def test_a_scene_that_cannot_be_loaded_leaves_no_folder_behind(tmp_path: Path) -
             generate(recipe(scene=str(tmp_path / "scene")), Path(), out)
     assert not (tmp_path / "new").exists()
     assert list((tmp_path / "empty").iterdir()) == []
-
-
-@pytest.mark.parametrize("content", ["{", '{"identity": "", "backend": 3}'])
-def test_a_damaged_mark_of_an_unfinished_dataset_is_named(tmp_path: Path, content: str) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / MARKER).write_text(content)
-    with pytest.raises(InputError, match=r"\.unfinished\.json: damaged"):
-        generate(recipe(), Path(), tmp_path / "out")
 
 
 def test_a_folder_with_something_else_is_refused_and_untouched(made: Path, tmp_path: Path) -> None:
@@ -207,17 +181,6 @@ def test_what_other_software_made_is_refused_and_untouched(
             generate(recipe(), Path(), folder)
     assert digest(out) == before
     assert verify(made) > 0
-
-
-def test_scene_scope_shares_one_budget_among_monochrome_views(tmp_path: Path) -> None:
-    photons = {"budget": 900, "scope": "scene", "statistics": "multinomial"}
-    sensor, products = {"cfa": "none"}, {"truth": False}
-    generate(recipe(photons=photons, sensor=sensor, products=products), Path(), tmp_path / "scene")
-    dataset = open_dataset(tmp_path / "scene")
-    assert dataset.counts.total == 900
-    assert (dataset.cfa, dataset.counts.channel_count) == (None, 1)
-    assert dataset.truth is None
-    assert not (tmp_path / "scene" / RADIANCE).exists()
 
 
 def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) -> None:

@@ -1,10 +1,10 @@
 """What is reused between datasets changes none of them, whatever was made before; and work is done once."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from digests import digest
-from property_settings import mostly_slow
 from tiny import GRID_2_X_2
 
 from pcii.base import silent
@@ -15,16 +15,13 @@ from simgen.spec import load_recipe
 pytestmark = pytest.mark.renders
 TOML = f'scene = "plain_pair"\nseed = 3\n{GRID_2_X_2}[photons]\nbudget = 100\n'
 ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
-PLAN, TRUTH, SCENE = "plan", "write_truth", "render_scene"
-CHANGES: list[tuple[list[str], set[str]]] = [
-    (["photons.budget=300"], {PLAN}),
-    ([ERRORS, "seed=4"], {PLAN, TRUTH}),
-    (["seed=4"], set[str]()),
-    (["analysis.z_mm=[500.0]"], {TRUTH}),
-    (["grid.pitch_mm=[9.0,18.0]"], {PLAN, TRUTH}),
-    (["scene=two_objects"], {SCENE, PLAN, TRUTH}),
+OTHERS = [
+    ["photons.budget=300"],
+    [ERRORS, "seed=4"],
+    ["analysis.z_mm=[500.0]"],
+    ["grid.pitch_mm=[9.0,18.0]"],
+    ["scene=two_objects"],
 ]
-"""Settings that differ from the dataset before, and the work that has to be done again."""
 
 
 @pytest.fixture
@@ -38,7 +35,7 @@ def recipe_file(tmp_path: Path) -> str:
     "others",
     [
         [["scene=two_objects"]],
-        pytest.param([overrides for overrides, _ in CHANGES], marks=pytest.mark.slow),
+        pytest.param(OTHERS, marks=pytest.mark.slow),
     ],
 )
 def test_datasets_are_the_same_whatever_was_made_before(
@@ -53,26 +50,24 @@ def test_datasets_are_the_same_whatever_was_made_before(
         assert digest(tmp_path / f"reused {number}") == digest(alone / str(overrides)), overrides
 
 
-@pytest.mark.parametrize(("overrides", "again"), mostly_slow(CHANGES, quick=CHANGES[1:2]))
 def test_only_what_depends_on_a_change_is_made_again(
-    recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
+    recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     works: list[str] = []
-    for owner, name in ((Prepared, SCENE), (Prepared, PLAN), (generation, TRUTH)):
+
+    def watch(owner: Any, name: str) -> None:
         work = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda *args: works.append(name) or work(*args))
 
-        def watched(*args: object, work: object = work, name: str = name) -> object:
-            works.append(name)
-            assert callable(work)
-            return work(*args)
-
-        monkeypatch.setattr(owner, name, watched)
+    watch(Prepared, "render_scene")
+    watch(Prepared, "plan")
+    watch(generation, "write_truth")
     reuse = Reuse()
     make(prepare(*load_recipe(recipe_file)), tmp_path / "first", silent, reuse)
-    assert sorted(works) == [PLAN, SCENE, TRUTH]
+    assert sorted(works) == ["plan", "render_scene", "write_truth"]
     works.clear()
-    make(prepare(*load_recipe(recipe_file, overrides)), tmp_path / "second", silent, reuse)
-    assert set(works) == again
+    make(prepare(*load_recipe(recipe_file, [ERRORS])), tmp_path / "second", silent, reuse)
+    assert sorted(works) == ["plan", "write_truth"]
 
 
 def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -> None:

@@ -10,11 +10,8 @@ import pytest
 import pcii
 import simgen
 from pcii.base import InputError
-from simgen.photons import Setup
-from simgen.photons.bright_light import lit_light, mirrored_light, straight_light
-from simgen.photons.exploration import sampler_of_films
-from simgen.renderer import LampTracer, RenderScene, backend, build, render_view
-from tests.png_files import png16
+from pcii.types import project_px
+from simgen.renderer import RenderScene, backend, build, render_view
 
 pytestmark = pytest.mark.renders
 
@@ -96,21 +93,7 @@ def test_a_small_lamp_behind_a_tilted_slab_gives_its_light(size_mm: float) -> No
         assert photons / view.sum() == pytest.approx(expected / (expected + others), abs=0.02)
 
 
-def test_light_is_the_same_from_both_sides() -> None:
-    """Of a lamp in view, whose light on a film is known."""
-    render_scene = built(scene_of([lamp()]))
-    setup = Setup(render_scene, GRID, "GRBG", 2)
-    (known,) = straight_light(setup)
-    assert known.light == pytest.approx(LAMP_LIGHT, rel=0.02)
-    tracer = LampTracer(render_scene, setup.rig, "GRBG", 2, 60.0)
-    number = [one.is_environment() for one in tracer.lamps].index(False)
-    arrivals, _ = tracer.follow(np.full(1 << 16, number), 1, 0.0)
-    error = np.sqrt((arrivals.light**2).sum())
-    assert arrivals.light.sum() == pytest.approx(LAMP_LIGHT, abs=4 * error)
-    assert error < 0.1 * LAMP_LIGHT
-
-
-@pytest.mark.parametrize("cutoff_deg", [0.01, 0.3, 3.0])
+@pytest.mark.parametrize("cutoff_deg", [0.1, 3.0])
 def test_the_dot_of_a_spot_lamp_has_its_light(cutoff_deg: float) -> None:
     radius_mm = 300 * np.tan(np.radians(cutoff_deg))
     dot_px = np.pi * (radius_mm / 500 * FOCAL_PX) ** 2
@@ -122,11 +105,15 @@ def test_the_dot_of_a_spot_lamp_has_its_light(cutoff_deg: float) -> None:
         beam_deg=cutoff_deg * 0.999,
         cutoff_deg=cutoff_deg,
     )
-    setup = Setup(built(scene_of([wall(500)], spot), max_depth=2), GRID, None, 2)
-    rows, paths = lit_light(setup, sampler_of_films(setup), REFLECTANCE * PIXELS, 1000)
-    # The wall has the light of the surroundings as well.
-    assert sum(row.light for row in rows) == pytest.approx(PIXELS + REFLECTANCE * dot_px, rel=0.02)
-    assert paths.k.size > 4000
+    scene = scene_of([wall(500)], spot)
+    counts, _ = simgen.draw_photons(scene, GRID, budget=4000, seed=1, cfa=None, max_depth=2)
+    i, j = np.indices((GRID.height, GRID.width))
+    for l in range(GRID.cols):
+        row, col = project_px(GRID, (10, 5, 500), 0, l)
+        near, view = np.hypot(i - row, j - col) < radius_mm / 500 * FOCAL_PX + 1.5, counts.dense[0, l]
+        # The dot gives a film `PIXELS`, the surroundings give each of its pixels the wall's reflectance.
+        expected = (1 + REFLECTANCE * near.mean()) / (1 + REFLECTANCE)
+        assert view[near].sum() / view.sum() == pytest.approx(expected, abs=4 * 0.5 / np.sqrt(4000))
 
 
 def test_images_in_curved_glass_are_refused_by_name() -> None:
@@ -192,32 +179,8 @@ def test_cameras_stand_in_the_medium_of_the_sensor(tmp_path: Path) -> None:
 def test_a_lamp_in_a_scene_with_a_medium_is_in_the_forecast(tmp_path: Path, shape: str) -> None:
     """Also a turned ball, of which Mitsuba mixes up places and normals."""
     scene = reference(tmp_path, FOG + SENSOR.format("") + WALL + ASIDE + SHINING.format(shape))
-    setup = Setup(built(scene, tmp_path, 4), GRID, None, 4)
-    (row,) = mirrored_light(setup, 0.6 * PIXELS, 1 << 15, with_straight=True)
-    image_px = np.pi * (0.1 / 500 * FOCAL_PX) ** 2
-    assert row.light == pytest.approx(3e5 * image_px, rel=0.15)
-    if shape == "disk":
-        with pytest.raises(InputError, match="'lamp' gives"):
-            simgen.draw_photons(scene, GRID, budget=2000, seed=0, cfa=None, max_depth=4)
-
-
-def test_a_bright_spot_of_a_picture_counts_by_itself(tmp_path: Path) -> None:
-    pixels = np.full((64, 64, 3), 1 << 9, dtype=np.int64)
-    pixels[40, 20] = 0xFFFF
-    (tmp_path / "screen.png").write_bytes(png16(pixels))
-    emission = simgen.Emission.model_validate({"luminance_cd_m2": 1e4, "texture": "screen.png"})
-    screen = simgen.SceneObject(
-        name="screen",
-        position_mm=(0, 0, 500),
-        shape=simgen.Card(width_mm=60, height_mm=60),
-        material=simgen.Material(reflectance=(0, 0, 0), emission=emission),
-    )
-    setup = Setup(built(scene_of([screen]), tmp_path), GRID, None, 2)
-    rows = sorted(straight_light(setup), key=lambda row: row.radiance)
-    texel_px = (60 / 64 / 500 * FOCAL_PX) ** 2
-    assert rows[-1].radiance > 5e3
-    assert rows[-1].image_px < 2 * texel_px
-    assert rows[0].image_px > 100 * texel_px
+    with pytest.raises(InputError, match="'lamp' gives"):
+        simgen.draw_photons(scene, GRID, budget=2000, seed=0, cfa=None, max_depth=4)
 
 
 def test_a_spot_that_single_precision_cannot_tell_is_refused(tmp_path: Path) -> None:

@@ -60,48 +60,6 @@ def test_bounds_hold_what_was_found_and_are_never_black(majorant: Majorant) -> N
     assert (majorant.bound >= DIM).all()
 
 
-def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) -> None:
-    over = pilot(3).take(np.array([0, 1, 2, 3]))
-    over.light[:] = [[0.0, 40.0, 0.0]] * 4
-    over.z_mm[:] = 300.0
-    before = majorant.layer.size
-    majorant.lift(over)
-    entry = majorant.owner_of(over)
-    assert (majorant.bound[entry, 1] > 40).all()
-    assert (majorant.radiance_ratio_bound[entry, 1] * over.guess[:, 1] > 40).all()
-    assert (majorant.bound >= DIM).all()  # green was lifted, and blue is not black for it
-    assert majorant.layer.size >= before
-
-
-@pytest.mark.parametrize("reach", [1, 3])
-@pytest.mark.parametrize("is_listed", [True, False])
-def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, is_listed: bool, reach: int) -> None:
-    lifted = majorant if is_listed else Majorant(GRID, majorant.layers, DIM)
-    over = pilot(3).take(np.array([0]))._replace(row=np.array([48]), col=np.array([64]))
-    over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
-    lifted.lift(over, reach)
-    _, row, col = lifted.layers.layer_row_col(lifted.layers.tiles_of(over))
-    bright = np.flatnonzero(lifted.bound[:, 1] > 40)
-    apart = np.maximum(abs(lifted.row[bright] - row), abs(lifted.col[bright] - col))
-    assert bright.size == (2 * reach + 1) ** 2
-    assert apart.max() == reach
-
-
-def test_raising_keeps_owners_and_lowers_no_limit(majorant: Majorant) -> None:
-    over = pilot(3).take(np.arange(200))
-    before, owners = majorant.copy(), majorant.owner_of(pilot(4))
-    over.light[:] = 1.5 * majorant.bound[majorant.owner_of(over)]
-    majorant.raise_bounds(over, 2)
-    np.testing.assert_array_equal(majorant.owner_of(pilot(4)), owners)
-    assert (majorant.bound >= before.bound).all()
-    assert (majorant.radiance_ratio_bound >= before.radiance_ratio_bound).all()
-    entry = majorant.owner_of(over)
-    assert (majorant.bound[entry] > over.light).all()
-    assert (majorant.radiance_ratio_bound[entry] * over.guess > over.light).all()
-    assert majorant.is_above(before)[entry].all()
-    assert not majorant.is_above(before).all()
-
-
 @pytest.mark.parametrize("shear_px", [(0.0, 0.0), (9.5, -6.0)])
 def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(shear_px: tuple[float, float]) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.

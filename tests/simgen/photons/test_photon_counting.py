@@ -1,6 +1,5 @@
 """Counts of a dataset: which way they are made, budgets within budgets, and what is written of them."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,18 @@ import zarr
 from scipy import stats
 
 from pcii.base import InputError, silent
-from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, Dataset, nested_name, open_dataset
-from pcii.types import Light, PhotonCounts, colour_index
+from pcii.store import COUNTS, PHOTON_TRUTH, nested_name
+from pcii.types import PhotonCounts, colour_index
 from simgen.dataset import capture_of
-from simgen.dataset.prepared import least_samples
-from simgen.photons import Plan, Setup, draw_from_views, photon_counting, probe, write_counts
-from simgen.photons import counting_plan as module
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, PROBE_SEED
+from simgen.photons import Plan, Setup, draw_from_views, write_counts
+from simgen.photons import plan as make_plan
+from simgen.photons import thin as thin_photons
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import PhotonTable, nested_subset
 from simgen.spec import Recipe, Scene, load_scene
 
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
+MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, MAX_SINGLE_PHOTONS = 0.01, 0.003, 1 << 25
 BUDGETS = (120, 40, 8)
 HEIGHT, WIDTH = 8, 10
 
@@ -50,12 +49,11 @@ def setup_of(made: Recipe, render_scene: RenderScene) -> Setup:
 
 def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
     setup = setup_of(made, render_scene)
-    capture, samples = capture_of(made, made.seed), least_samples(made)
-    return module.plan(capture, setup, kind, samples, may_explore=lambda _: False)
+    return make_plan(capture_of(made, made.seed), setup, kind, may_explore=lambda _: False)
 
 
 def thin(made: Recipe, render_scene: RenderScene, plan: Plan = PLAN) -> PhotonTable:
-    return photon_counting.thin(capture_of(made, made.seed), setup_of(made, render_scene), plan)[0]
+    return thin_photons(capture_of(made, made.seed), setup_of(made, render_scene), plan)[0]
 
 
 def no_noise(k: int, l: int) -> np.ndarray:
@@ -175,15 +173,6 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
     assert stats.chi2.sf(chi_square(first_rows), lit.sum()) < 1e-6
 
 
-@pytest.mark.parametrize("statistics", ["poisson", "multinomial"])
-def test_smaller_budgets_do_not_change_the_whole(statistics: str) -> None:
-    alone = recipe(photons={"budget": BUDGETS[0], "statistics": statistics})
-    together = recipe(photons=nested(statistics=statistics))
-    one_by_one = dense(together)
-    assert (one_by_one.n == 1).all()
-    np.testing.assert_array_equal(counted(dense(alone), alone), counted(one_by_one, together))
-
-
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
     arrivals, log = draw_from_views(
@@ -191,23 +180,8 @@ def test_views_without_light_have_no_photons_of_any_budget() -> None:
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
-        assert by_scope(counted(subset(arrivals, made, budget), made), "view").tolist() == [0, 0] + 2 * [
-            budget
-        ]
-    black, log = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
-    )
-    assert log["views_without_light"] == 4
-    assert subset(black, made, 8).k.size == 0
-
-
-def test_too_many_photons_to_be_told_apart_are_refused_before_any_view_is_rendered(
-    monkeypatch: pytest.MonkeyPatch, two_objects: RenderScene
-) -> None:
-    monkeypatch.setattr(module, "MAX_SINGLE_PHOTONS", 300)
-    planned(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
-    with pytest.raises(InputError, match=r"photons\.nested: .* photons are too many"):
-        planned(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
+        totals = by_scope(counted(subset(arrivals, made, budget), made), "view")
+        assert totals.tolist() == [0, 0, budget, budget]
 
 
 def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
@@ -230,7 +204,7 @@ FAULTY = {
 IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
 
 
-@pytest.mark.parametrize("sensor", [{}, {"bits": 1}, FAULTY, FAULTY | {"bits": 2}, IN_FRAMES])
+@pytest.mark.parametrize("sensor", [{}, FAULTY | {"bits": 2}, IN_FRAMES])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
     told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
@@ -245,14 +219,6 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
         for budget, part in ((8, small), (40, middle))
     ]
     assert not (tmp_path / PHOTON_TRUTH).exists()  # rendered views do not know what a photon came from
-
-
-def test_without_faults_what_arrives_is_what_is_written(tmp_path: Path) -> None:
-    made = recipe(photons={"budget": 500})
-    arrivals = dense(made)
-    told = write_counts(capture_of(made, made.seed), made.sensor, arrivals, tmp_path, with_origins=True)
-    np.testing.assert_array_equal(stored(tmp_path, made), counted(arrivals, made))
-    assert told["arrived"] == told["total"] == arrivals.n.sum()
 
 
 def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
@@ -274,7 +240,7 @@ def from_known_places(made: Recipe) -> PhotonTable:
 
 
 @pytest.mark.parametrize(
-    "sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"bits": 2}, IN_FRAMES | {"frames": 40}]
+    "sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0, "bits": 2}, IN_FRAMES | {"frames": 40}]
 )
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
@@ -332,28 +298,22 @@ def test_what_is_made_in_either_way_is_exact_at_every_budget(
     two_objects: RenderScene, wall: RenderScene
 ) -> None:
     ways = set()
-    for scene in (two_objects, wall):
-        for kind in ("llvm", "scalar"):
-            assert planned(recipe(grid=PROBED, photons={"budget": 10}), scene, kind).thins
-            for budget in (1e3, 1e7, 1e9):
-                made = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
-                assert made.thins or made.noise <= MAX_NOISE_SHARE
-                assert made.keeps_origins == (6 * budget <= module.MAX_SINGLE_PHOTONS)
-                ways.add((made.thins, made.keeps_origins))
+    for scene, kind in ((two_objects, "llvm"), (two_objects, "scalar"), (wall, "llvm")):
+        for budget in (10, 1e3, 1e7, 1e9):
+            made = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
+            assert made.thins or (made.noise <= MAX_NOISE_SHARE and budget > 10)
+            assert made.normaliser_error <= MAX_NORMALISER_ERROR
+            assert made.keeps_origins == (6 * budget <= MAX_SINGLE_PHOTONS)
+            ways.add((made.thins, made.keeps_origins))
     assert len(ways) == 4
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize("light", [{"photons": {"budget": 1e13}}, {"photons": {"scope": "exposure"}}])
-def test_more_photons_than_can_be_exact_are_refused_with_how_many_can(
-    two_objects: RenderScene, light: dict[str, Any]
-) -> None:
-    bright = recipe(grid=PROBED, exposure={"time_s": 1e6}, **light)
+def test_more_photons_than_can_be_exact_are_refused_with_how_many_can(two_objects: RenderScene) -> None:
     with pytest.raises(InputError, match="more than can be made without rendering noise; at most") as refused:
-        planned(bright, two_objects, "llvm")
+        planned(recipe(grid=PROBED, photons={"budget": 1e13}), two_objects, "llvm")
     most = float(str(refused.value).split()[-3])
-    if bright.photons.scope == "view":
-        assert planned(recipe(grid=PROBED, photons={"budget": most}), two_objects, "llvm").thins
+    assert planned(recipe(grid=PROBED, photons={"budget": most}), two_objects, "llvm").thins
 
 
 @pytest.mark.renders
@@ -374,50 +334,8 @@ def test_photons_that_are_too_many_to_be_kept_are_the_same_but_for_their_origins
 )
 def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: dict[str, Any]) -> None:
     # Not only near break-even: the samples of dense views are the same too.
-    plans = [planned(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in range(1, 5)]
-    assert plans == plans[:1] * 4
-
-
-@pytest.mark.renders
-@pytest.mark.parametrize(
-    ("scope", "budget", "pixels"), [("view", 250, 4096), ("channel", 84, 1024), ("scene", 1500, 6 * 4096)]
-)
-def test_a_budget_is_divided_by_light_that_is_known_well(
-    two_objects: RenderScene, scope: str, budget: float, pixels: int
-) -> None:
-    dim = recipe(grid=PROBED, photons={"budget": budget, "scope": scope})
-    seen = probe(Setup(two_objects, dim.grid.camera_grid(), "GRBG", 3), PROBE_SEED)
-    made = planned(dim, two_objects, "llvm")
-    error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
-    assert made.normaliser_error == pytest.approx(error)
-    assert error <= MAX_NORMALISER_ERROR
-    share = made.samples / (
-        made.samples - 1
-    )  # and one sample less would be too few for this or for the counts
-    assert error * np.sqrt(share) > MAX_NORMALISER_ERROR or made.noise * share > MAX_NOISE_SHARE
-
-
-def exposed(built: RenderScene, photons_per_view: float, **changes: Any) -> Recipe:
-    """No budget, but an exposure that brings about so many photons."""
-
-    def of(time_s: float) -> Recipe:
-        scope = {"scope": "exposure"}
-        return recipe(grid=PROBED, photons=scope, exposure={"time_s": time_s}, **changes)
-
-    found = planned(of(1e-9), built, "scalar").photons_per_view
-    return of(1e-9 * photons_per_view / found)
-
-
-@pytest.mark.renders
-def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> None:
-    plans = [planned(exposed(two_objects, n), two_objects, "scalar") for n in (0.1, 10, 40, 1e6)]
-    samples = [made.samples for made in plans]
-    assert samples[0] == 1
-    assert samples[0] < samples[1] < samples[2] < samples[3]
-    assert all(made.noise <= MAX_NOISE_SHARE for made in plans)
-    images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
-    with_images = exposed(two_objects, 1, **images)
-    assert planned(with_images, two_objects, "scalar").samples == 33
+    plans = [planned(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in (1, 2)]
+    assert plans[0] == plans[1]
 
 
 @pytest.mark.renders
@@ -433,43 +351,3 @@ def test_darkness_is_planned_too() -> None:
     # What the virtual centre sees says nothing about how large a budget is.
     with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
         planned(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
-
-
-def views_of(dataset: Dataset) -> np.ndarray:
-    return np.stack([dataset.counts.view(k, l) for k, l in np.ndindex(2, 3)])
-
-
-@pytest.mark.renders
-def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
-    dataset = open_dataset(nested_dataset)
-    whole, middle, small = (views_of(dataset.at_light(Light(n))) for n in (400, 120, 30))
-    assert (small <= middle).all()
-    assert (middle <= whole).all()
-    for views, budget in ((whole, 400), (middle, 120), (small, 30)):
-        # Six views of so many photons and 38 dark counts: a Poisson total, within 5 standard deviations.
-        expected = 6 * (budget + 0.01 * 64 * 60)
-        assert abs(views.sum() - expected) < 5 * np.sqrt(expected)
-    np.testing.assert_array_equal(whole, views_of(dataset))
-    reached = dataset.at_light(Light(30))  # from which another can be
-    assert (dataset.light, reached.light) == (Light(400), Light(30))
-    np.testing.assert_array_equal(views_of(reached.at_light(Light(400))), whole)
-    manifest = json.loads((nested_dataset / MANIFEST).read_text())
-    assert {"counts.zarr", "counts-30.zarr", "counts-120.zarr"} <= {
-        name.split("/")[0] for name in manifest["files"]
-    }
-    assert [entry["budget"] for entry in manifest["photons"]["nested"]] == [30, 120]
-
-
-@pytest.mark.renders
-def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None:
-    whole = open_dataset(nested_dataset)
-    for dataset in (whole, whole.at_light(Light(120)), whole.at_light(Light(30))):
-        assert dataset.truth is not None
-        photons = dataset.truth.photons
-        assert photons is not None
-        assert photons.k.size == dataset.counts.total
-        dark = photons.object_id == -1
-        # 6 views of 38.4 dark counts each.
-        assert abs(dark.sum() - 230.4) < 4 * np.sqrt(230.4)
-        assert np.isinf(photons.z_mm[dark]).all()
-        assert set(np.unique(photons.object_id)) == {-1, 0, 1, 2}

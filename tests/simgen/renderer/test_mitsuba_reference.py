@@ -57,18 +57,13 @@ GLOSSY = """<shape type="sphere" id="ball"><point name="center" x="-.7" y="-.3" 
 <emitter type="spot"><transform name="to_world">
 <lookat origin="-2,2,2" target="0,0,0" up="0,1,0"/></transform>
 <rgb name="intensity" value="15,20,25"/></emitter>"""
-HAIRY = """<shape type="bsplinecurve" id="tuft"><string name="filename" value="tuft.txt"/>
-<bsdf type="hair"/></shape>
-<shape type="sdfgrid" id="blob"><string name="filename" value="ball.vol"/><transform name="to_world">
-<translate x=".1" y="-.9"/></transform></shape><emitter type="constant"/>"""
 FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"/>
 <rgb name="albedo" value=".9,.8,.6"/>
 </medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
 <bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
-MATT = '<bsdf type="diffuse"><rgb name="reflectance" value="%g"/></bsdf>'
 OBJ = '<shape type="obj"><string name="filename" value="%s"/></shape>'
 SURFACE = '<shape type="sphere"><bsdf type="%s">%s</bsdf></shape>'
-PICTURE = '<texture type="%s" name="reflectance"/>'
+PICTURE = '<texture type="bitmap" name="reflectance"/>'
 BALL: dict[str, Any] = {
     "name": "ball",
     "position_mm": [0, 0, 3000],
@@ -82,14 +77,6 @@ def folder(tmp_path: Path) -> Path:
     """Files that the scenes name."""
     colours = np.random.default_rng(1).integers(0, 255, (8, 8, 3), dtype=np.uint8)
     Image.fromarray(colours).save(tmp_path / "picture.png")
-    places = np.stack(np.meshgrid(*[np.linspace(0, 1, 12)] * 3, indexing="ij"), axis=-1)
-    ball = np.linalg.norm(places - 0.5, axis=-1) - 0.35
-    backend.load().VolumeGrid(ball.astype(np.float32)).write(str(tmp_path / "ball.vol"))
-    strands = (
-        "\n".join(f"{0.1 * strand - 0.6} {0.25 * knot - 0.5} {0.02 * knot**2} 0.03" for knot in range(6))
-        for strand in range(12)
-    )
-    (tmp_path / "tuft.txt").write_text("\n\n".join(strands))
     return tmp_path
 
 
@@ -109,7 +96,6 @@ def tiles_of(views: list[np.ndarray]) -> np.ndarray:
     ("content", "names", "is_thinned"),
     [
         (GLOSSY, {"ball", "one", "two"}, True),
-        (HAIRY, {"tuft", "blob"}, True),
         (FOGGY, {"cloud"}, False),
     ],
 )
@@ -147,31 +133,6 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
     row, column = int(0.71 * SIDE), int(0.27 * SIDE)
     seen = hit.instance[0] or hit.shape[0]
     assert truth.names[int(truth.object_id[row, column])] == seen.id()
-
-
-@pytest.mark.renders
-def test_a_lamp_whose_surface_is_rounded_into_its_own_sight_has_its_photons(folder: Path) -> None:
-    """Single precision turns faces so that a point sees others of its face edge-on: densities beyond 1e19."""
-    turned = '<rotate y="1" angle="180"/>'
-    place = (
-        '<transform name="to_world"><scale value="%g"/>'
-        + turned
-        + '<translate x="%g" y="%g" z="%g"/></transform>'
-    )
-    facing = '<sensor type="perspective" id="front"/>'
-    wall = f'<shape type="rectangle" id="wall">{place % (450, 0, 0, 620)}{MATT % 0.6}</shape>'
-    side_mm = 30.0
-    area_px = (side_mm / 500 * FOCAL_MM / GRID.pixel_mm) ** 2
-    radiance = 0.6 * SIDE**2 / area_px
-    shines = f'<emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter>'
-    lamp = f'<shape type="rectangle" id="lamp">{place % (side_mm / 2, -7, -3, 500)}{MATT % 0}{shines}</shape>'
-    light = '<emitter type="constant"><rgb name="radiance" value="1"/></emitter>'
-    scene = scene_of(folder, facing + wall + lamp + light, mitsuba={"file": "scene.xml", "unit_mm": 1.0})
-    counts, truth = simgen.draw_photons(scene, GRID, budget=4000, cfa=None, seed=1, max_depth=3)
-    assert truth.photons is not None
-    number = next(number for number, name in truth.names.items() if name == "lamp")
-    share = (truth.photons.object_id == number).sum() / counts.total
-    assert share == pytest.approx(SIDE**2 / (2 * SIDE**2 - area_px), abs=0.03)  # 4 of 0.008
 
 
 @pytest.mark.renders
@@ -227,10 +188,8 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
     [
         ('<path value="plugins"/>', "<path> is not followed"),
         ('<bsdf type="../../evil"/>', "outside the scene's folder"),
-        ('<bsdf type="a.b"/>', "no name of a plugin"),
         ('<default name="d" value="."/>' + OBJ % "$d$d/secret.obj", "outside the scene's folder"),
         (OBJ % "linked.obj", "lies outside the folder"),
-        (OBJ % "no.obj", "there is no file"),
         ('<include filename="scene.xml"/><include filename="scene.xml"/>', "deep"),
         ("<broken", "not valid XML"),
     ],
@@ -250,14 +209,8 @@ def test_files_that_lead_outside_are_refused(tmp_path: Path, content: str, sente
     [
         ('<!DOCTYPE scene [<!ENTITY a "b">]>', "ascii", "no DOCTYPE"),
         ("<!--\u00e4-->", "utf-8-sig", ""),
-        ('<?xml version="1.0" encoding="utf-8"?><!--\u00e4-->', "utf-8", ""),
-        ('<?xml version="1.0" encoding="ISO-8859-1"?>', "ascii", ""),
-        ('<?xml version="1.0" encoding="ISO-8859-1"?><!--\u00e4-->', "utf-8", "encoding 'ISO-8859-1'"),
         ('<?xml version="1.0" encoding="UTF-7"?>', "ascii", "encoding 'UTF-7'"),
-        ("<!--\u00e4-->", "latin-1", "UTF-8"),
         ("", "utf-16", "UTF-8"),
-        ("", "utf-16-le", "UTF-8"),
-        ("", "cp037", "UTF-8"),
     ],
 )
 def test_only_what_every_parser_reads_alike_is_read(
@@ -301,12 +254,10 @@ def test_what_mitsuba_refuses_is_one_sentence(tmp_path: Path) -> None:
     for content, sentence in (
         (CAMERA + wrong, "radios"),
         (CAMERA + '<shape type="spher"/>', "'spher' is none of Mitsuba's plugins"),
-        (CAMERA + '<shape type="blender"/>', "'blender' is none of Mitsuba's plugins"),
         (CAMERA + SURFACE % ("conductor", '<string name="material" value="Xx"/>'), "'Xx' is none"),
-        # These three end the process otherwise.
+        # These end the process otherwise.
         (CAMERA + SURFACE % ("blendbsdf", ""), "a blendbsdf needs a weight"),
-        (CAMERA + SURFACE % ("diffuse", PICTURE % "bitmap"), "a bitmap needs a filename"),
-        (CAMERA + SURFACE % ("diffuse", PICTURE % "volume"), "a volume needs a volume"),
+        (CAMERA + SURFACE % ("diffuse", PICTURE), "a bitmap needs a filename"),
         ("<shape/>", "cannot read"),
         (ROOM, "it has 0 sensors; give mitsuba.camera"),
     ):

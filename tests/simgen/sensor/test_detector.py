@@ -1,6 +1,6 @@
 """What a sensor loses, adds and cuts off: exact small cases, and statistics whose planted fault is caught."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,10 @@ from scipy import stats
 from pcii.base import InputError
 from pcii.types import CameraGrid, colour_index, mosaic
 from simgen.sensor import PhotonTable, dark_map, detect, full_light_image, no_photons, read_out
-from simgen.sensor.photon_table import NO_OBJECT
 from simgen.spec import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)
+NO_OBJECT = -1
 COLUMNS = [field.name for field in fields(PhotonTable)]
 
 
@@ -73,29 +73,17 @@ FAULTS = (
 )
 
 
-@pytest.mark.parametrize("first_hits", [True, False])
-def test_a_sensor_without_faults_changes_no_bit(first_hits: bool) -> None:
+def test_a_sensor_without_faults_changes_no_bit() -> None:
     arrivals = poisson(0.7, seed=1)
-    if not first_hits:
-        arrivals = replace(arrivals, object_id=None, z_mm=None)
     counts = detect(arrivals, GRID, "GRBG", Sensor(), seed=1)
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(counts, name), getattr(arrivals, name))
     for fault in FAULTS:
         faulty = detect(arrivals, GRID, "GRBG", Sensor.model_validate(fault), seed=1)
         assert (counted(faulty) != counted(arrivals)).any()
-        assert (faulty.object_id is not None) == first_hits
 
 
-def test_the_same_seed_gives_the_same_counts_and_another_others() -> None:
-    sensor, arrivals = Sensor(quantum_efficiency=EFFICIENCY, dark_counts=0.01), poisson(0.7, seed=1)
-    one, again, other = (detect(arrivals, GRID, "GRBG", sensor, seed) for seed in (3, 3, 4))
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(again, name))
-    assert (counted(one) != counted(other)).any()
-
-
-@pytest.mark.parametrize("cfa", ["GRBG", "BGGR", None])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
 def test_each_colour_is_detected_with_its_efficiency_and_stays_poisson(cfa: str | None) -> None:
     sensor, arrivals = Sensor(quantum_efficiency=EFFICIENCY), poisson(2.0, seed=1)
     once = detect(arrivals, GRID, cfa, sensor, seed=2)
@@ -197,8 +185,6 @@ OBJECTS = np.full((50, 60), None)
         (MAP.T, r"map.npy: expected mean dark counts \(H, W\) = \(50, 60\), or .* got \(60, 50\)"),
         (MAP - 1e-9, "finite numbers from 0"),
         (MAP + np.nan, "finite numbers from 0"),
-        (MAP + np.inf, "finite numbers from 0"),
-        (MAP + 0j, "finite numbers from 0"),
         (OBJECTS, "not an array of numbers in a .npy file"),  # which pickles would be read for
     ],
 )
@@ -227,35 +213,9 @@ def test_dead_pixels_never_count() -> None:
     assert silent(counts + counted(dark)).sum() < 30  # the fault: dark counts in dead pixels
     another = silent(counted(detect(arrivals, GRID, "GRBG", dead, seed=4)))
     assert (another != silent(counts)).any()
-
-
-def test_a_pixel_that_is_hot_and_dead_is_dead() -> None:
-    all_hot = Sensor(hot_pixel_share=1.0, hot_pixel_counts=50.0, dead_pixel_share=0.5)
-    counts = counted(detect(poisson(2.0, seed=1), GRID, "GRBG", all_hot, seed=1))
-    assert silent(counts).sum() == 1500
-    assert is_poisson(counts[..., ~silent(counts)], 52.0)
-    none_left = Sensor(dead_pixel_share=1.0, dark_counts=1.0)
-    assert detect(poisson(1.0, seed=1), GRID, "GRBG", none_left, seed=1).k.size == 0
-
-
-TEN = films(1, 1, 2, 5)
-UP_TO_NINE = np.arange(10).reshape(1, 1, 2, 5)
-
-
-@pytest.mark.parametrize("bits", [1, 2, 3, 32])
-def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
-    most = 2**bits - 1
-    expected = np.minimum(UP_TO_NINE, most)
-    photons = arriving(UP_TO_NINE)
-    np.testing.assert_array_equal(counted(read_out(photons, TEN, Sensor(bits=bits), seed=1), TEN), expected)
-    k, l, i, j = (np.tile(index, 2) for index in np.nonzero(UP_TO_NINE))
-    n = UP_TO_NINE[UP_TO_NINE > 0]
-    in_two_lumps = PhotonTable(k, l, i, j, np.concatenate([n // 2, n - n // 2]))
-    stopped = read_out(in_two_lumps, TEN, Sensor(bits=bits), seed=1)
-    np.testing.assert_array_equal(counted(stopped, TEN), expected)
-    one_after_the_other = np.minimum(in_two_lumps.n, most)  # the fault: each lump stops by itself
-    wrong = counted(replace(in_two_lumps, n=one_after_the_other), TEN)
-    assert bits == 32 or (wrong != expected).any()
+    both = Sensor(dead_pixel_share=0.5, hot_pixel_share=0.5, hot_pixel_counts=50.0)
+    dark = counted(detect(DARKNESS, GRID, "GRBG", both, seed=1))
+    assert silent(dark).sum() == 1500  # others are dead than are hot
 
 
 def companions(n: list[int]) -> PhotonTable:
@@ -267,7 +227,7 @@ def companions(n: list[int]) -> PhotonTable:
     return PhotonTable(k, l, i, j, np.tile(n, 4096), nobody, nobody, ids, np.full(flat.size, 600.0))
 
 
-@pytest.mark.parametrize(("n", "bits"), [([1, 1, 1], 1), ([1, 1, 1, 1, 1], 2), ([1, 9], 1), ([2, 8], 2)])
+@pytest.mark.parametrize(("n", "bits"), [([1, 1, 1], 1), ([2, 8], 2)])
 def test_which_counts_a_counter_keeps_is_left_to_chance(n: list[int], bits: int) -> None:
     arrivals, pixels = companions(n), films(1, 1, 64, 64)
     kept = read_out(arrivals, pixels, Sensor(bits=bits), seed=1)

@@ -13,7 +13,6 @@ from simgen.dataset import capture_of
 from simgen.photons import Plan, Setup, draw_from_views, plan, thin
 from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import PhotonTable, photons_per_radiance
-from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND
 from simgen.spec import Exposure, Recipe, Scene
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
@@ -66,11 +65,6 @@ def counted(arrivals: PhotonTable) -> np.ndarray:
     counts = np.zeros((2, 64, 80), dtype=np.int64)
     np.add.at(counts, (arrivals.l, arrivals.i, arrivals.j), arrivals.n)
     return counts
-
-
-def test_a_lux_of_green_is_so_many_photons() -> None:
-    # A handbook's number: 4.09e11 photons of 555 nm a second and square centimetre.
-    assert pytest.approx(4.09e11 * 1e4, rel=1e-3) == PHOTONS_PER_LUMEN_SECOND
 
 
 def test_photons_per_radiance_are_those_by_hand() -> None:

@@ -93,18 +93,12 @@ def test_a_cylinders_depth_is_exact_and_its_ends_are_closed(tilt: float, tmp_pat
     same_depth(hits, np.where(inside, near, np.inf), sure)
 
 
-def square(folder: Path, name: str) -> dict:
+def square(folder: Path) -> dict:
     """A square of 60 mm as a mesh, its texture coordinates from the lower left."""
     corners = [(-1, 1, 0, 0), (1, 1, 1, 0), (1, -1, 1, 1), (-1, -1, 0, 1)]  # Y is down
-    if name.endswith(".obj"):
-        text = "".join(f"v {x} {y} 0\nvt {u} {v}\n" for x, y, u, v in corners) + "f 1/1 2/2 3/3 4/4\n"
-    else:
-        text = "ply\nformat ascii 1.0\nelement vertex 4\n"
-        text += "".join(f"property float {axis}\n" for axis in "xyzst")
-        text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-        text += "".join(f"{x} {y} 0 {u} {v}\n" for x, y, u, v in corners) + "4 0 1 2 3\n"
-    (folder / name).write_text(text)
-    return {"type": "mesh", "file": name, "scale": 30.0}
+    text = "".join(f"v {x} {y} 0\nvt {u} {v}\n" for x, y, u, v in corners) + "f 1/1 2/2 3/3 4/4\n"
+    (folder / "a.obj").write_text(text)
+    return {"type": "mesh", "file": "a.obj", "scale": 30.0}
 
 
 SHAPES: dict[str, dict] = {
@@ -127,10 +121,10 @@ TURNED: list[tuple[str, Vector]] = [
 
 @pytest.mark.parametrize(
     ("shape", "turn"),
-    [*((name, (0, 0, 0)) for name in ("card", "sphere", "cylinder", "box", "a.ply", "a.obj")), *TURNED],
+    [*((name, (0, 0, 0)) for name in ("card", "sphere", "cylinder", "box", "mesh")), *TURNED],
 )
 def test_a_picture_is_upright_and_not_mirrored(shape: str, turn: Vector, tmp_path: Path) -> None:
-    whole = SHAPES.get(shape) or square(tmp_path, shape)
+    whole = SHAPES.get(shape) or square(tmp_path)
     built = placed(tmp_path, whole, QUADRANTS, turn=turn)
     image = render_view(built, GRID, 0, 0, samples_per_pixel=16, seed=3)
     lit = image > 0.3 * image.max()
@@ -153,4 +147,4 @@ def test_a_picture_needs_texture_coordinates(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scale", [1e9, 1e-9])
 def test_a_meshs_size_must_make_sense(scale: float, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"object 'thing', shape.scale: .* mm are allowed"):
-        placed(tmp_path, square(tmp_path, "a.obj") | {"scale": scale})
+        placed(tmp_path, square(tmp_path) | {"scale": scale})

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from pcii.base import InputError
-from simgen.spec import load_recipe, load_sweep
-from simgen.spec.sweeps import Axis
+from simgen.spec import Scene, UniformLight, load_recipe, load_sweep
 
 TOML = """
 scene = "two_objects"
@@ -75,31 +74,26 @@ def test_a_folder_keeps_its_name_when_values_are_added(recipe_file: str) -> None
         names = own
 
 
-def test_folders_are_named_by_the_scene_and_told_apart_by_a_hash_where_it_is_no_plain_name() -> None:
-    values = ["two_objects", "../mine/scene.toml", "../mine/scene toml", "/", "\n" + 70 * "x"]
-    names = [Axis("scene", values, "scene").name_of(value) for value in values]
-    assert names[0] == "scene_two_objects"
-    assert [name[:-8] for name in names[1:]] == [
-        *2 * ["scene_mine-scene-toml-"],
-        "scene_",
-        f"scene_{40 * 'x'}-",
-    ]
-    assert len(set(names)) == len(values)
+def test_folders_of_scenes_that_are_named_by_a_path_are_told_apart_by_a_hash(
+    recipe_file: str, tmp_path: Path
+) -> None:
+    names = ("my scene", "my  scene", "my-scene")
+    for name in names:
+        Scene(title="light", lights=(UniformLight(luminance_cd_m2=1.0),)).save(tmp_path / name)
+    sweep = load_sweep(recipe_file, ["photons.budget=100", f"scene={{each={[*names]}}}"])
+    folders = [sweep.folder(number) for number in range(3)]
+    assert [folder[:15] for folder in folders] == ["scene_my-scene-", "scene_my-scene-", "scene_my-scene"]
+    assert len(set(folders)) == 3
 
 
 @pytest.mark.parametrize(
     ("override", "message"),
     [
         ("photons.budget=[]", "photons.budget: expected at least one value"),
-        ("photons.budget={each=3}", "photons.budget: expected at least one value"),
         ("photons.budget=[100, 100.0]", "photons.budget: gives a value twice"),
         ("photons.budget=[100, -1]", r"at photons.budget = -1: 'photons.budget': .*greater than 0"),
         ("seed={range=[1, 2.5]}", r"seed: range: expected \[first, end\]"),
-        ("seed={range=[1, 9, 0]}", r"seed: range: expected \[first, end\]"),
-        ("seed={range=[5, 5]}", "seed: expected at least one value"),
-        ("seed={range=[0, 100000000000000000000]}", "seed: at most 1000000 values"),
         ("seed={range=[0, 600000]}", "1200000 datasets; at most 1000000"),
-        ("seed={range=[9223372036854775806, 9223372036854775809]}", "'seed': input should be less than"),
         ("photons.budgets=[1, 2]", "unknown key 'photons.budgets'"),
         ('scene=["two_objects", "overlapp"]', "there is no scene 'overlapp'; did you mean 'overlap'"),
     ],

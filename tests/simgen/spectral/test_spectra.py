@@ -12,9 +12,7 @@ from pcii.base import InputError
 from simgen.base import validate
 from simgen.spec import Scene
 from simgen.spectral import (
-    CELLS,
     WAVELENGTH_NM,
-    Filters,
     filters_for,
     illuminant,
     integral,
@@ -22,9 +20,8 @@ from simgen.spectral import (
     patch,
     patch_names,
     sensitivity,
-    spectra,
 )
-from simgen.spectral.spectra import colour_science, linear_srgb, measured, tint
+from simgen.spectral.spectra import colour_science, linear_srgb
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 
@@ -38,7 +35,6 @@ def test_illuminants_have_luminance_1_and_their_own_chromaticity(name: str) -> N
     expected = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
     # The published chromaticities have four or five digits, and spectra are cut at 380 and 780 nm.
     np.testing.assert_allclose(xyz[:2] / xyz.sum(), expected, atol=2e-4)
-    assert (np.array([0.2126, 0.7152, 0.0722]) @ tint(name)) == pytest.approx(1)
 
 
 def test_grey_patches_are_grey_and_red_is_red() -> None:
@@ -52,24 +48,7 @@ def test_grey_patches_are_grey_and_red_is_red() -> None:
     np.testing.assert_allclose(linear_srgb(np.ones(WAVELENGTH_NM.size)), 1, rtol=1e-12)
 
 
-def test_spectra_are_kept_between_processes_to_the_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(spectra, "_standard", spectra._standard.__wrapped__)  # no cache in this process
-    direct = measured(colour_science().SDS_COLOURCHECKERS["ColorChecker N Ohta"]["cyan"])
-    np.testing.assert_array_equal(patch("cyan"), direct)
-    (file,) = (tmp_path / "simgen").iterdir()
-    with monkeypatch.context() as without_colour:
-        without_colour.setattr(spectra, "colour_science", None)
-        np.testing.assert_array_equal(patch("cyan"), direct)
-    for damage in ("", "{}"):
-        file.write_text(damage)
-        np.testing.assert_array_equal(patch("cyan"), direct)
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("lamp", ["D65", "A", "FL2"])
+@pytest.mark.parametrize(("camera", "lamp"), [(CAMERAS[0], "D65"), (CAMERAS[1], "FL2")])
 def test_drawn_wavelengths_give_what_a_pixel_sees(camera: str, lamp: str) -> None:
     filters = filters_for(sensitivity(camera, Path()), illuminant(lamp))
     light = illuminant(lamp) * patch("cyan")
@@ -97,16 +76,6 @@ def test_a_perfect_detector_of_555_nm_counts_lumens() -> None:
     assert integral(filters.sensitivity[0] * line) == pytest.approx(luminance, rel=2e-3)
 
 
-def test_cells_of_wavelengths_grow_and_cover_where_a_pixel_sees() -> None:
-    curve = np.where((WAVELENGTH_NM >= 500) & (WAVELENGTH_NM <= 600), 1.0, 0.0)
-    filters = Filters(curve[None], illuminant("D65"))
-    bounds = filters.wavelength_nm[0]
-    assert bounds.shape == (CELLS + 1,)
-    assert (np.diff(bounds) > 0).all()
-    assert bounds[0] == pytest.approx(499, abs=0.5)  # the curve rises from 0 at 499 nm
-    assert bounds[-1] == pytest.approx(601, abs=0.5)
-
-
 def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
     lines = ["wavelength_nm,R,G,B"] + [f"{nm},{nm - 400},{50},{700 - nm}" for nm in range(400, 701, 10)]
     (tmp_path / "mine.csv").write_text("\n".join(lines))
@@ -124,7 +93,6 @@ def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("wavelength_nm,R,G,B\n400,1,2\n", "expected the head wavelength_nm,R,G,B"),
-        ("wavelength_nm,B,G,R\n400,1,1,2\n500,1,1,1\n", "expected the head wavelength_nm,R,G,B"),
         ("wavelength_nm,R,G,B\n400,1,nan,2\n500,1,1,1\n", "finite"),
         ("wavelength_nm,R,G,B\n500,1,1,2\n400,1,1,1\n", "growing"),
         ("wavelength_nm,R,G,B\n400,0,1,2\n500,0,1,1\n", "sees no light from 380 to 780 nm"),
