@@ -44,14 +44,11 @@ class Cell(NamedTuple):
     parameters: Mapping[str, Parameter] = {}
 
 
-PAPER, SECTIONS = "Photon counts of the paper's recipe", "Sections at the paper's size"
+PAPER = "Photon counts of the paper's recipe"
 RATIO = "thinning against dense with 16 samples, the paper's recipe"
 CELLS = {
     "photons.paper_ms": Cell("photon-costs", "thinning, 1000 photons per view", PAPER, "time_ms"),
     "photons.against_16_samples": Cell("photon-costs", RATIO),
-    "sections.events_ms": Cell("section-growth", "events", SECTIONS, "time_ms"),
-    "sections.dense_ms": Cell("section-growth", "dense, mean", SECTIONS, "time_ms"),
-    "sections.against_opencv": Cell("section-growth", "events against OpenCV, bilinear"),
 }
 """Figures of studies by name."""
 
@@ -59,7 +56,7 @@ CELLS = {
 def text_of(name: str, value: Value) -> str:
     """A figure as pages quote it; a part of its name ends in its unit, that of a ratio begins with against.
 
-    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("sections.against_opencv", Value(52.8))
+    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("photons.against_16_samples", Value(52.8))
     ('553 ms (537 to 566)', '52.8 ×')
     """
     parts = name.split(".")
