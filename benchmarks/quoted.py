@@ -56,7 +56,7 @@ CELLS = {
 def text_of(name: str, value: Value) -> str:
     """A figure as pages quote it; a part of its name ends in its unit, that of a ratio begins with against.
 
-    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("photons.against_16_samples", Value(52.8))
+    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("photons.against_dense", Value(52.8))
     ('553 ms (537 to 566)', '52.8 ×')
     """
     parts = name.split(".")
