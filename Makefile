@@ -70,9 +70,7 @@ stress: llvm $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -n 2 -m "stress or hypothesis" --hypothesis-profile=stress
 
 bench-setup: llvm
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[denoiser]' \
-	  || echo "the denoiser could not be installed; its rows are left out"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 
 bench: bench-setup
 	$(BIN)/python -m benchmarks $(TABLES) --out $(OUT)/bench

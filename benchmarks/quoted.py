@@ -96,7 +96,7 @@ def add_studies(content: Content, records: Iterable[Record]) -> None:
 def _value(record: Record, cell: Cell) -> Value:
     measured = record.measured
     if not cell.table:
-        return next(ratio.ratio for ratio in measured.ratios if ratio.name == cell.row)
+        return measured.ratios[cell.row]
     return measured.one(cell.table, cell.row, **cell.parameters).values[cell.quantity]
 
 

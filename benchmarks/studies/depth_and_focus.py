@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.figures import curve, frame
-from benchmarks.results import Measured, Parameter, Ratio, Row, Size, Study, Value
+from benchmarks.results import Measured, Parameter, Row, Size, Study, Value
 from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
@@ -108,10 +108,10 @@ def _value(row: Any, scale: float = 1.0) -> Value:
     return Value(scale * row.mean, low, high)
 
 
-def _ratios(rows: list[Row]) -> list[Ratio]:
+def _ratios(rows: list[Row]) -> dict[str, Value]:
     """How many times more depths the default method has within 1 px than the best plane sweep."""
     measured, sweeps = Measured(rows), {*map(depth_name, SWEEPS)}
-    ratios: list[Ratio] = []
+    ratios: dict[str, Value] = {}
     for row in measured.of(DEPTH):
         if row.name == DEFAULT:
             others = [each for each in measured.of(DEPTH, **row.parameters) if each.name in sweeps]
@@ -120,7 +120,7 @@ def _ratios(rows: list[Row]) -> list[Ratio]:
                 for some in ([row], others)
             )
             name = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons: depths within"
-            ratios.append(Ratio(f"{name} 1 px by {DEFAULT} against the best sweep", Value(own / best), 1.0))
+            ratios[f"{name} 1 px by {DEFAULT} against the best sweep"] = Value(own / best)
     return ratios
 
 
