@@ -98,7 +98,6 @@ docs: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	rm -rf docs/api
 	$(BIN)/python -m sphinx -q -E -W --keep-going -b html docs $(OUT)/docs
-	$(BIN)/python docs/check_links.py $(OUT)/docs
 	@echo "Open $(OUT)/docs/index.html in a browser."
 
 notebooks: llvm $(VENV)/.ready-dev
