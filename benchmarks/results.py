@@ -20,12 +20,11 @@ if TYPE_CHECKING:
 Size = Literal["quick", "full"]
 Parameter = str | int | float
 UNITS = {
-    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "mm": "mm",
-    "bits": "bits", "bytes": "bytes",
+    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "mb": "MB", "px": "px", "mm": "mm", "bits": "bits",
 }  # fmt: skip
 SPELLINGS = {
-    "1px": "1 px", "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000",
-    "cpsnr": "CPSNR", "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
+    "1px": "1 px", "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "flip": "FLIP", "iou": "IoU",
+    "rmse": "RMSE", "mse": "MSE",
 }  # fmt: skip
 """Words that are written in another way than names of quantities."""
 
@@ -124,9 +123,10 @@ def mean_of(samples: Iterable[float]) -> Value:
     return value_of(mean_interval(list(samples), "positive"))
 
 
-def value_of(mean: Any) -> Value:
-    """A mean of `pcii.evaluation`, whose one sample has no interval."""
-    return Value(mean.mean) if mean.n == 1 else Value(mean.mean, mean.low, mean.high)
+def value_of(mean: Any, scale: float = 1.0) -> Value:
+    """A mean of `pcii.evaluation` times `scale`; that of one sample has no interval."""
+    found = scale * mean.mean
+    return Value(found) if mean.n == 1 else Value(found, scale * mean.low, scale * mean.high)
 
 
 def write_record(folder: Path, record: Record) -> None:

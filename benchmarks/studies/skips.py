@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.figures import bars
 from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.scenes import film
-from benchmarks.skips import SKIPS, Arrays, Skip, World
+from benchmarks.skip_pairs import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
 from simgen.spec.recipe import Recipe, load_recipe
 
