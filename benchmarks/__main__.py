@@ -11,7 +11,7 @@ from benchmarks import paper_scene
 from benchmarks.guard import REFERENCE, losses, reference_of
 from benchmarks.machine import commit, in_words, machine, versions, was_busy
 from benchmarks.page import tables_of, write_page
-from benchmarks.quoted import add, add_benchmark, add_studies, read_figures, write_figures
+from benchmarks.quoted import add, add_benchmark, add_study, read_figures, write_figures
 from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
 from pcii.base.errors import InputError
@@ -94,7 +94,8 @@ def publish(out: Path) -> int:
     """
     records = records_in(out)
     content = read_figures()
-    add_studies(content, records)
+    for record in records:
+        add_study(content, record)
     place = {"machine": in_words(machine()), "date": f"{datetime.now(UTC):%Y-%m-%d}", "commit": commit()}
     command = {"command": f"python -m benchmarks publish, {paper_scene.SEEDS} draws of photons"}
     add(content, "paper", command | place, paper_scene.measure(out / paper_scene.FOLDER))

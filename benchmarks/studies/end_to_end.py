@@ -42,9 +42,8 @@ print(json.dumps(outcome.timings_s))
 """What `pcii run` does, but for the command line; it tells the seconds of its stages."""
 ASIDE = "everything else"
 """Imports, starting and stopping: what is in no stage."""
-
-
 POLL_S = 0.02
+"""Between two looks at the memory of a process."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Dense views are timed on a few views and scaled to all, since each costs the sam
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +15,8 @@ from benchmarks.results import Measured, Row, Size, Study, Value
 from benchmarks.scenes import film, setup_of
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.types.camera_grid import CameraGrid
-from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.recipe import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,10 +26,9 @@ COSTS = "Cost of each, which the choice between both ways goes by"
 GROWTH = "Thinning of two views, by photons"
 DENSE = "dense + Poisson"
 BASE = "thinning, 1000 photons per view"
-OTHERS = {
-    "thinning, 16 times as many pixels": (4, []),
-    "thinning, 10 000 photons per view": (1, ["photons.budget=10000"]),
-}
+AGAINST_16 = "thinning against dense with 16 samples, the paper's recipe"
+FINER = "thinning, 16 times as many pixels"
+BRIGHTER = "thinning, 10 000 photons per view"
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {"side_px": 1024, "repeats": 6, "dense_views": 1, "most_photons": 5},
@@ -44,24 +43,24 @@ def measure(side_px: int, repeats: int, dense_views: int, most_photons: int) -> 
 
 
 def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dict[str, Value]]:
-    recipe, _ = load_recipe("paper", film(side_px))
-    setup, logs = setup_of(recipe), dict[str, dict[str, Any]]()
+    recipes = {
+        BASE: load_recipe("paper", film(side_px))[0],
+        FINER: load_recipe("paper", film(4 * side_px))[0],
+        BRIGHTER: load_recipe("paper", [*film(side_px), "photons.budget=10000"])[0],
+    }
+    setups = {name: setup_of(recipe) for name, recipe in recipes.items()}
+    setup, photons, logs = setups[BASE], recipes[BASE].photons, dict[str, dict[str, Any]]()
 
-    def thinning(name: str, own: Recipe, own_setup: Setup, seed: int) -> None:
-        logs[name] = thin_photons(own_setup, own.photons, seed=seed)[1]
+    def thin(name: str, seed: int) -> None:
+        logs[name] = thin_photons(setups[name], recipes[name].photons, seed=seed)[1]
 
-    def dense(samples: int, seed: int) -> None:
+    def render(samples: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
         for view in range(dense_views):
-            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, recipe.photons.budget, rng)
+            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, photons.budget, rng)
 
-    works: dict[str, Any] = {BASE: lambda n: thinning(BASE, recipe, setup, n)}
-    for name, (finer, settings) in OTHERS.items():
-        own, _ = load_recipe("paper", [*film(finer * side_px), *settings])
-        own_setup = setup_of(own)
-        works[name] = lambda n, name=name, own=own, s=own_setup: thinning(name, own, s, n)
-    for samples in (1, 16):
-        works[f"{DENSE}, samples: {samples}"] = lambda n, samples=samples: dense(samples, n)
+    works = {name: partial(thin, name) for name in recipes}
+    works |= {dense_name(samples): partial(render, samples) for samples in (1, 16)}
     seconds = side_by_side(works, repeats)
     scale = setup.grid.view_count / dense_views
     rows: list[Row] = []
@@ -74,18 +73,23 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dic
         rows.append(Row(PAPER, name, {}, values))
     ratios = {
         f"thinning against dense with {samples} samples, the paper's recipe": ratio_of(
-            seconds[f"{DENSE}, samples: {samples}"], seconds[BASE], scale
+            seconds[dense_name(samples)], seconds[BASE], scale
         )
         for samples in (1, 16)
     }
     return [*rows, *_costs(seconds, scale, setup.grid)], ratios
 
 
+def dense_name(samples: int) -> str:
+    """What dense rendering with so many samples per pixel is called."""
+    return f"{DENSE}, samples: {samples}"
+
+
 def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> list[Row]:
     """What `simgen.photons.counting_plan` chooses by."""
     pixels = grid.view_count * grid.height * grid.width
-    base, more = (np.array(seconds[name]) for name in (BASE, "thinning, 10 000 photons per view"))
-    one, sixteen = (scale * np.array(seconds[f"{DENSE}, samples: {samples}"]) for samples in (1, 16))
+    base, more = (np.array(seconds[name]) for name in (BASE, BRIGHTER))
+    one, sixteen = (scale * np.array(seconds[dense_name(samples)]) for samples in (1, 16))
     sample = (sixteen - one) / (15 * pixels)
     found = {
         "a photon more, by thinning": (more - base) / (9000 * grid.view_count),
@@ -129,7 +133,7 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def reading(measured: Measured) -> str:
     """How to read it: the ratio to dense rendering, and what a photon costs."""
-    ratio = measured.ratios["thinning against dense with 16 samples, the paper's recipe"].value
+    ratio = measured.ratios[AGAINST_16].value
     rows = measured.of(GROWTH)
     few, many = (row.values["time_ms"].value for row in (rows[0], rows[-1]))
     cost = measured.one(COSTS, "a photon more, by thinning").values["cost_us"].value
