@@ -1,20 +1,21 @@
 """The command behind `make bench`: run studies, compare their ratios, publish the page."""
 
 import argparse
+import json
 import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks import paper_scene
-from benchmarks.figures import draw
-from benchmarks.guard import losses, read_reference, write_reference
+from benchmarks.guard import REFERENCE, losses, reference_of
 from benchmarks.machine import commit, in_words, machine, versions, was_busy
-from benchmarks.page import tables_of, write_html, write_markdown
-from benchmarks.quoted import add, add_benchmark, add_studies, read_figures, write_figures
+from benchmarks.page import tables_of, write_page
+from benchmarks.quoted import add, add_benchmark, add_study, read_figures, write_figures
 from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
 from pcii.base.errors import InputError
+from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.tables import markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
@@ -38,8 +39,8 @@ def main() -> int:
                 raise InputError(f"NAME: there is no study named {name!r}; use {', '.join(studies)}")
         for name in given.names or studies:
             measure(studies[name], "full" if given.full else "quick", given.out)
-        write_html(given.out / "benchmarks.html", STUDIES, records_in(given.out))
-        print(f"The page is {given.out / 'benchmarks.html'}.")
+        write_page(given.out / PAGE.name, STUDIES, records_in(given.out))
+        print(f"The page is {given.out / PAGE.name}.")
     except InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2
@@ -47,7 +48,7 @@ def main() -> int:
 
 
 def measure(study: Study, size: Size, out: Path) -> Record:
-    """Run one study and write its results and figure; print its tables as Markdown."""
+    """Run one study and write its results; print its tables as Markdown."""
     print(f"{study.title} ({study.name}, {size}) ...", flush=True)
     place, start = machine(), time.perf_counter()
     if was_busy(place):
@@ -56,7 +57,6 @@ def measure(study: Study, size: Size, out: Path) -> Record:
     measured = study.measure(**study.sizes[size])
     record = Record(study.name, size, date, time.perf_counter() - start, place, versions(), measured)
     write_record(out, record)
-    draw(study, measured, out / f"{study.name}.png")
     for table in tables_of(measured.rows):
         print(f"\n{table.title}\n\n{markdown(table)}", flush=True)
     print(f"\n{study.reading(measured)}\n", flush=True)
@@ -74,7 +74,7 @@ def records_in(out: Path) -> list[Record]:
 
 def guard(out: Path) -> int:
     """Compare the ratios of the results with the committed table; 1 if one was lost."""
-    records, reference = records_in(out), read_reference()
+    records, reference = records_in(out), json.loads(REFERENCE.read_text(encoding="utf-8"))
     for record in records:
         entry = reference.get(record.study)
         if entry is not None and entry["size"] != record.size:
@@ -94,13 +94,14 @@ def publish(out: Path) -> int:
     """
     records = records_in(out)
     content = read_figures()
-    add_studies(content, records)
+    for record in records:
+        add_study(content, record)
     place = {"machine": in_words(machine()), "date": f"{datetime.now(UTC):%Y-%m-%d}", "commit": commit()}
     command = {"command": f"python -m benchmarks publish, {paper_scene.SEEDS} draws of photons"}
     add(content, "paper", command | place, paper_scene.measure(out / paper_scene.FOLDER))
     add_benchmark(content, out.parent / "submissions")
-    write_markdown(PAGE, STUDIES, records)
-    write_reference(records)
+    write_page(PAGE, STUDIES, records)
+    write_json_safely(REFERENCE, reference_of(records))
     write_figures(content)
     print(f"wrote {PAGE.name}, its figures, those of all pages, and the reference of the guard")
     return 0

@@ -14,7 +14,7 @@ from simgen.dataset.dataset_folder import versions as dataset_versions
 from simgen.renderer import backend
 
 PEERS = ("scipy", "numba", "colour-science")
-EXTRAS = ("opencv-python-headless", "flip-evaluator", "mitsuba-oidn")
+EXTRAS = ("opencv-python-headless", "flip-evaluator")
 BUSY = 0.25
 """Share of the cores in use from which on a machine counts as busy."""
 LOOK_S = 1.0

@@ -1,8 +1,6 @@
-"""The page of all studies: figures, tables and how to read them, as Markdown and as HTML from templates."""
+"""The page of all studies in Markdown: figures, how to read them, and tables."""
 
-import base64
 from collections.abc import Sequence
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +11,45 @@ from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.tables import Table, markdown
 
 PICTURES = "benchmarks"
-"""Folder of the figures, beside the Markdown page."""
+"""Folder of the figures, beside the page."""
+HEAD = """# Run time against error
+
+Made by `make bench`, and put into the guide by `make bench-publish`; no figure is typed. What is compared
+was measured side by side in one run. In brackets and as bars: 95 % intervals, by Student's t of means over
+seeds, by order statistics of medians of run times, by resampling or propagation where the text says so.
+Seconds are of one machine; ratios are what `python -m benchmarks guard` compares."""
 
 
-def write_markdown(path: Path, studies: Sequence[Study], records: Sequence[Record]) -> None:
-    """Write the page and its figures, in a folder beside it."""
-    sections = [_section(study, record) for study, record in _pairs(studies, records)]
-    for study, record in _pairs(studies, records):
-        draw(study, record.measured, path.parent / PICTURES / f"{study.name}.png")
-    text = _rendered("benchmarks.md.j2", sections=sections, pictures=PICTURES)
-    write_bytes_safely(path, text.encode())
+def write_page(path: Path, studies: Sequence[Study], records: Sequence[Record]) -> None:
+    """Write the page of those studies that have run, in their order, and its figures in a folder."""
+    of_study = {record.study: record for record in records}
+    ran = [study for study in studies if study.name in of_study]
+    for study in ran:
+        draw(study, of_study[study.name].measured, path.parent / PICTURES / f"{study.name}.png")
+    versions = ", ".join(f"{name} {number}" for name, number in records[0].versions.items())
+    parts = [HEAD, *(_section(study, of_study[study.name]) for study in ran), f"Versions: {versions}.\n"]
+    write_bytes_safely(path, "\n\n".join(parts).encode())
 
 
-def write_html(path: Path, studies: Sequence[Study], records: Sequence[Record]) -> None:
-    """Write the page in one file; figures are those that `draw` wrote in the same folder."""
-    sections = [_section(study, record) for study, record in _pairs(studies, records)]
-    for section in sections:
-        picture = (path.parent / f"{section['name']}.png").read_bytes()
-        section["picture"] = "data:image/png;base64," + base64.b64encode(picture).decode()
-    write_bytes_safely(path, _rendered("benchmarks.html.j2", sections=sections, script=None).encode())
+def _section(study: Study, record: Record) -> str:
+    measured, machine = record.measured, record.machine
+    tables = tables_of(measured.rows)
+    if measured.ratios:
+        rows = tuple((name, told(ratio)) for name, ratio in measured.ratios.items())
+        tables.append(Table("Ratios", ("how many times better, side by side", "ratio"), rows))
+    seeds = f", seeds {', '.join(map(str, measured.seeds))}" if measured.seeds else ""
+    parts = [f"## {study.title}", f"![{study.title}]({PICTURES}/{study.name}.png)", study.reading(measured)]
+    parts += [part for table in tables for part in (f"**{table.title}**", markdown(table))]
+    parts.append(
+        f"Study `{study.name}`, {record.size} size, {record.date[:10]}, commit {record.versions['commit']},"
+        f" {record.wall_s:.0f} s on {in_words(machine)}{seeds}."
+    )
+    if was_busy(machine):
+        parts.append(
+            "The machine was busy with other work when it began"
+            f" ({machine['cores_in_use']} cores in use): seconds are too long, ratios less so."
+        )
+    return "\n\n".join(parts)
 
 
 def tables_of(rows: Sequence[Row]) -> list[Table]:
@@ -76,58 +94,3 @@ def _parameter(value: Any) -> str:
     if value is None:
         return "–"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _pairs(studies: Sequence[Study], records: Sequence[Record]) -> list[tuple[Study, Record]]:
-    """Studies that have run, in their order, each with its record."""
-    by_name = {record.study: record for record in records}
-    return [(study, by_name[study.name]) for study in studies if study.name in by_name]
-
-
-def _section(study: Study, record: Record) -> dict[str, Any]:
-    machine = record.machine
-    tables = tables_of(record.measured.rows)
-    if record.measured.ratios:
-        tables.append(_ratios(record))
-    return {
-        "name": study.name,
-        "title": study.title,
-        "reading": study.reading(record.measured),
-        "tables": [{"table": table, "markdown": markdown(table)} for table in tables],
-        "size": record.size,
-        "date": date.fromisoformat(record.date[:10]).isoformat(),
-        "wall_s": round(record.wall_s),
-        "machine": in_words(machine),
-        "busy": was_busy(machine),
-        "cores_in_use": machine["cores_in_use"],
-        "seeds": ", ".join(map(str, record.measured.seeds)),
-        "versions": ", ".join(f"{name} {number}" for name, number in record.versions.items()),
-    }
-
-
-def _ratios(record: Record) -> Table:
-    rows = [
-        (
-            ratio.name,
-            told(ratio.ratio),
-            "–" if ratio.asked is None else f"{ratio.asked:g}",
-            "–" if ratio.asked is None else ("yes" if ratio.ratio.value >= ratio.asked else "no"),
-        )
-        for ratio in record.measured.ratios
-    ]
-    header = ("how many times better, side by side", "ratio", "asked for", "met")
-    return Table("Ratios", header, tuple(rows))
-
-
-def _rendered(template: str, **content: Any) -> str:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("benchmarks"), PackageLoader("pcii.evaluation")]),
-        autoescape=template.endswith(".html.j2"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template(template).render(content)

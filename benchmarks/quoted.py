@@ -9,11 +9,12 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.machine import commit, in_words
 from benchmarks.page import told
-from benchmarks.results import UNITS, Parameter, Record, Value, value_of
+from benchmarks.results import UNITS, Record, Value, value_of
+from benchmarks.studies import photon_costs
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.benchmark_scores import by_scene
@@ -34,32 +35,10 @@ MEASURES = ("iou", "within_1px", "within_3px")
 Content = dict[str, dict[str, Any]]
 
 
-class Cell(NamedTuple):
-    """Where a figure stands in the results of a study: a row's quantity or, without a table, a ratio."""
-
-    study: str
-    row: str
-    table: str = ""
-    quantity: str = ""
-    parameters: Mapping[str, Parameter] = {}
-
-
-PAPER, SECTIONS = "Photon counts of the paper's recipe", "Sections at the paper's size"
-RATIO = "thinning against dense with 16 samples, the paper's recipe"
-CELLS = {
-    "photons.paper_ms": Cell("photon-costs", "thinning, 1000 photons per view", PAPER, "time_ms"),
-    "photons.against_16_samples": Cell("photon-costs", RATIO),
-    "sections.events_ms": Cell("section-growth", "events", SECTIONS, "time_ms"),
-    "sections.dense_ms": Cell("section-growth", "dense, mean", SECTIONS, "time_ms"),
-    "sections.against_opencv": Cell("section-growth", "events against OpenCV, bilinear"),
-}
-"""Figures of studies by name."""
-
-
 def text_of(name: str, value: Value) -> str:
     """A figure as pages quote it; a part of its name ends in its unit, that of a ratio begins with against.
 
-    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("sections.against_opencv", Value(52.8))
+    >>> text_of("photons.paper_ms", Value(553.2, 537, 566)), text_of("photons.against_dense", Value(52.8))
     ('553 ms (537 to 566)', '52.8 ×')
     """
     parts = name.split(".")
@@ -82,25 +61,21 @@ def add(content: Content, source: str, about: Mapping[str, str], values: Iterabl
     content["figures"] = dict(sorted((kept | new).items()))
 
 
-def add_studies(content: Content, records: Iterable[Record]) -> None:
-    """Figures of the studies that have run at quick size: other sizes have other rows."""
-    for record in records:
-        own = {name: cell for name, cell in CELLS.items() if cell.study == record.study}
-        if own and record.size == "quick":
-            about = {
-                "command": f"python -m benchmarks {record.study}",
-                "machine": in_words(record.machine),
-                "date": record.date[:10],
-                "commit": record.versions.get("commit", "unknown"),
-            }
-            add(content, record.study, about, [(name, _value(record, cell)) for name, cell in own.items()])
-
-
-def _value(record: Record, cell: Cell) -> Value:
-    measured = record.measured
-    if not cell.table:
-        return next(ratio.ratio for ratio in measured.ratios if ratio.name == cell.row)
-    return measured.one(cell.table, cell.row, **cell.parameters).values[cell.quantity]
+def add_study(content: Content, record: Record) -> None:
+    """What is quoted of the study of the cost of photons, at quick size: others have other rows."""
+    if record.study == photon_costs.STUDY.name and record.size == "quick":
+        about = {
+            "command": f"python -m benchmarks {record.study}",
+            "machine": in_words(record.machine),
+            "date": record.date[:10],
+            "commit": record.versions["commit"],
+        }
+        paper = record.measured.one(photon_costs.PAPER, photon_costs.BASE)
+        values = {
+            "photons.paper_ms": paper.values["time_ms"],
+            "photons.against_16_samples": record.measured.ratios[photon_costs.AGAINST_16],
+        }
+        add(content, record.study, about, values.items())
 
 
 def add_benchmark(content: Content, submissions: Path) -> None:

@@ -4,7 +4,6 @@ Names of quantities end in their unit where they have one (`time_ms`, `rmse_perc
 words.
 """
 
-import csv
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -21,12 +20,11 @@ if TYPE_CHECKING:
 Size = Literal["quick", "full"]
 Parameter = str | int | float
 UNITS = {
-    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "mm": "mm",
-    "bits": "bits", "bytes": "bytes",
+    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "mb": "MB", "px": "px", "mm": "mm", "bits": "bits",
 }  # fmt: skip
 SPELLINGS = {
-    "1px": "1 px", "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000",
-    "cpsnr": "CPSNR", "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
+    "1px": "1 px", "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "flip": "FLIP", "iou": "IoU",
+    "rmse": "RMSE", "mse": "MSE",
 }  # fmt: skip
 """Words that are written in another way than names of quantities."""
 
@@ -51,23 +49,14 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """How many times better ours is than what was measured beside it in the same run; more is better.
+class Measured:
+    """The rows and ratios of one run of a study, and the seeds that they are of.
 
-    `asked` is what the ratio is to be at least, where that was said beforehand.
+    A ratio, by its name, says how many times better ours is than what was measured beside it in the same run.
     """
 
-    name: str
-    ratio: Value
-    asked: float | None = None
-
-
-@dataclass(frozen=True)
-class Measured:
-    """The rows and ratios of one run of a study, and the seeds that they are of."""
-
     rows: Sequence[Row]
-    ratios: Sequence[Ratio] = ()
+    ratios: Mapping[str, Value] = field(default_factory=dict)
     seeds: Sequence[int] = ()
 
     def of(self, table: str, **parameters: Parameter) -> list[Row]:
@@ -81,10 +70,6 @@ class Measured:
             if row.name == name:
                 return row
         raise KeyError(f"{table}: {name} {parameters}")
-
-    def ratio(self, name: str) -> float:
-        """The ratio of this name."""
-        return next(ratio.ratio.value for ratio in self.ratios if ratio.name == name)
 
 
 @dataclass(frozen=True)
@@ -138,26 +123,16 @@ def mean_of(samples: Iterable[float]) -> Value:
     return value_of(mean_interval(list(samples), "positive"))
 
 
-def value_of(mean: Any) -> Value:
-    """A mean of `pcii.evaluation`, whose one sample has no interval."""
-    return Value(mean.mean) if mean.n == 1 else Value(mean.mean, mean.low, mean.high)
+def value_of(mean: Any, scale: float = 1.0) -> Value:
+    """A mean of `pcii.evaluation` times `scale`; that of one sample has no interval."""
+    found = scale * mean.mean
+    return Value(found) if mean.n == 1 else Value(found, scale * mean.low, scale * mean.high)
 
 
 def write_record(folder: Path, record: Record) -> None:
-    """Write <study>.json, and <study>.csv with a line for every value."""
+    """Write <study>.json."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json_safely(folder / f"{record.study}.json", asdict(record))
-    rows = record.measured.rows
-    names = list(dict.fromkeys(name for row in rows for name in row.parameters))
-    with (folder / f"{record.study}.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["table", "name", *names, "quantity", "value", "low", "high"])
-        for row in rows:
-            parameters = [row.parameters.get(name, "") for name in names]
-            for quantity, found in row.values.items():
-                writer.writerow(
-                    [row.table, row.name, *parameters, quantity, found.value, found.low, found.high]
-                )
 
 
 def read_record(path: Path) -> Record:
@@ -165,13 +140,14 @@ def read_record(path: Path) -> Record:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         measured = content.pop("measured")
-        rows = [
-            Row(**row | {"values": {name: Value(**found) for name, found in row["values"].items()}})
-            for row in measured["rows"]
-        ]
-        ratios = [Ratio(**ratio | {"ratio": Value(**ratio["ratio"])}) for ratio in measured["ratios"]]
-        return Record(**content, measured=Measured(rows, ratios, measured["seeds"]))
-    except (ValueError, TypeError, KeyError) as fault:
+        rows = [Row(**row | {"values": _values_of(row["values"])}) for row in measured["rows"]]
+        own = Measured(rows, _values_of(measured["ratios"]), measured["seeds"])
+        return Record(**content, measured=own)
+    except (ValueError, TypeError, KeyError, AttributeError) as fault:
         raise InputError(
             f"{path}: expected results of a study, as `make bench` writes them ({fault})"
         ) from None
+
+
+def _values_of(content: Mapping[str, Any]) -> dict[str, Value]:
+    return {name: Value(**found) for name, found in content.items()}

@@ -9,11 +9,6 @@ from simgen.sensor.detector import sensitivities
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene_lookup import load_scene
 
-KINDS = ("plain", "textured", "cards", "room", "crossing", "leaves", "checks", "shiny")
-"""Kinds of drawn scenes that studies are of."""
-FIRST_NUMBER = 100
-"""Numbers of drawn scenes from here on are for figures, those below for tuning."""
-
 
 def setup_of(recipe: Recipe) -> Setup:
     """The recipe's scene and cameras."""

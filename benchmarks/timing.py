@@ -5,32 +5,21 @@ from collections.abc import Callable, Mapping, Sequence
 from statistics import median
 from typing import TypeVar
 
-from benchmarks.results import Ratio, Value
+from benchmarks.results import Value
 
-Result = TypeVar("Result")
+Name = TypeVar("Name", str, int)
 REPEATS = 6
 """Least and largest of six are an interval of their median at 97 %."""
 
 
-def timed(work: Callable[[int], Result], repeats: int = REPEATS) -> tuple[list[float], Result]:
-    """Seconds of some runs, numbered from 1, after one that warms up; and the last result."""
-    result, seconds = work(0), []
-    for repeat in range(1, repeats + 1):
-        del result  # else its memory is asked for anew each time, which may cost more than the work
-        start = time.perf_counter()
-        result = work(repeat)
-        seconds.append(time.perf_counter() - start)
-    return seconds, result
-
-
 def side_by_side(
-    works: Mapping[str, Callable[[int], object]], repeats: int = REPEATS
-) -> dict[str, list[float]]:
+    works: Mapping[Name, Callable[[int], object]], repeats: int = REPEATS
+) -> dict[Name, list[float]]:
     """Seconds of each work, which take turns: what else the machine does slows all of them alike.
 
     Each is called with the number of its round; round 0 warms up and is not counted.
     """
-    seconds: dict[str, list[float]] = {name: [] for name in works}
+    seconds: dict[Name, list[float]] = {name: [] for name in works}
     for number in range(repeats + 1):
         for name, work in works.items():
             start = time.perf_counter()
@@ -58,15 +47,9 @@ def median_of(samples: Sequence[float], scale: float = 1.0) -> Value:
     return Value(median(ordered), ordered[outside], ordered[-1 - outside])
 
 
-def ratio_of(
-    name: str,
-    slower: Sequence[float],
-    faster: Sequence[float],
-    asked: float | None = None,
-    scale: float = 1.0,
-) -> Ratio:
+def ratio_of(slower: Sequence[float], faster: Sequence[float], scale: float = 1.0) -> Value:
     """How many times longer the first takes than the second, by rounds of `side_by_side`.
 
     `scale` is how many times the first would have to be done for one of the second.
     """
-    return Ratio(name, median_of([scale * a / b for a, b in zip(slower, faster, strict=True)]), asked)
+    return median_of([scale * a / b for a, b in zip(slower, faster, strict=True)])

@@ -2,7 +2,6 @@
 
 from dataclasses import fields, is_dataclass
 from inspect import Signature, signature
-from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -17,8 +16,6 @@ version = release = pcii.__version__
 
 RULES = "Annotated[", "custom_error"
 """What stands in the types of fields that have rules of what is valid."""
-BENCHMARKS = "benchmarks"
-"""The page that `make bench-publish` writes: it joins the others once it is there."""
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 templates_path = ["_templates"]  # of the pages of the reference, a name each, which go to the folder api
@@ -61,16 +58,10 @@ def setup(app: Any) -> None:
     Of the models of scenes and recipes only names and defaults are shown: their types hold all the rules of
     what is valid, which the texts of the fields say in words.
     """
-    app.connect("source-read", _leave_out_benchmarks)
     app.connect("autodoc-process-signature", _names_and_defaults)
     app.connect("autodoc-skip-member", lambda app, what, name, *_: name.startswith("model_") or None)
     app.connect("object-description-transform", _leave_out_rules)
     app.add_html_math_renderer("mathml", (_inline_equation, None), (_displayed_equation, None))
-
-
-def _leave_out_benchmarks(app: Any, page: str, source: list[str]) -> None:
-    if page == "index" and not Path(app.srcdir, f"{BENCHMARKS}.md").exists():
-        source[0] = source[0].replace(f"\n{BENCHMARKS}\n", "\n")
 
 
 def _names_and_defaults(app: Any, what: str, name: str, kind: Any, *_: Any) -> tuple[str, None] | None:

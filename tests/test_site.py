@@ -1,7 +1,6 @@
 """The site: every public name is in the reference."""
 
 import re
-import runpy
 from pathlib import Path
 
 import pcii
@@ -16,12 +15,6 @@ def test_every_public_name_has_a_page_in_the_reference() -> None:
         blocks = re.findall(rf"currentmodule:: {module.__name__}\n(.*?)```", text, re.DOTALL)
         listed = re.findall(r"^   (\w+)$", "\n".join(blocks), re.MULTILINE)
         assert sorted(listed) == sorted(module.__all__)
-
-
-def test_the_page_of_camera_sets_is_what_its_script_makes_of_the_measurements() -> None:
-    script = runpy.run_path(str(DOCS / "make_camera_sets.py"))
-    rows = script["read"](DOCS / "camera_sets.csv")
-    assert script["page"](rows) == (DOCS / "camera_sets.md").read_text(encoding="utf-8")
 
 
 def test_the_glossary_names_rooms_and_modules_that_are_there() -> None:

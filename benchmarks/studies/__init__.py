@@ -4,7 +4,6 @@ photon_images     Photon counts by thinning and by dense rendering, and how far 
 photon_costs      What a photon costs at the paper's size, and how that grows.
 radiance_images   Renderings by samples, lengths of paths, modes of the renderer, and a denoiser.
 sections          Errors of sections of a known texture, ours and other packages'.
-section_growth    Time of sections at the paper's size, and how that grows.
 depth_and_focus   Depth and removal by every method over photon budgets.
 skips             Work that is skipped: on against off.
 end_to_end        From a recipe to a report, beside a plain script.
@@ -17,7 +16,6 @@ from benchmarks.studies import (
     photon_costs,
     photon_images,
     radiance_images,
-    section_growth,
     sections,
     skips,
 )
@@ -27,7 +25,6 @@ STUDIES: tuple[Study, ...] = (
     photon_costs.STUDY,
     radiance_images.STUDY,
     sections.STUDY,
-    section_growth.STUDY,
     depth_and_focus.STUDY,
     skips.STUDY,
     end_to_end.STUDY,

@@ -8,10 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from benchmarks.figures import curve, frame
-from benchmarks.results import Measured, Parameter, Ratio, Row, Size, Study, Value
+from benchmarks.results import Measured, Parameter, Row, Size, Study, Value, value_of
 from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
@@ -46,7 +44,6 @@ SIZES: Mapping[Size, Mapping[str, Any]] = {
         "side_px": 128,
         "seeds": 3,
         "budgets": (100, 1000, 10000),
-        "methods": methods_for(full_light=False),
     },
     "full": {
         "names": ("paper", "slats", "natural_balls", "plain_pair"),
@@ -54,15 +51,12 @@ SIZES: Mapping[Size, Mapping[str, Any]] = {
         "side_px": 512,
         "seeds": 10,
         "budgets": (30, 100, 1000, 10000, 100000),
-        "methods": methods_for(full_light=False),
     },
 }
 
 
-def measure(
-    names: Sequence[str], rows: int, side_px: int, seeds: int, budgets: Sequence[int], methods: Sequence[str]
-) -> Measured:
-    """Methods by their full names on recipes that ship, with so many by so many cameras and pixels."""
+def measure(names: Sequence[str], rows: int, side_px: int, seeds: int, budgets: Sequence[int]) -> Measured:
+    """All methods on recipes that ship, with so many by so many cameras and pixels."""
     pitch_mm = 45 * 2 / (rows - 1)  # twice the paper's span, so that coarse pixels tell depths apart
     *nested, most = sorted(budgets)
     settings = [
@@ -77,7 +71,11 @@ def measure(
             generate_collection(sweep, Path(folder) / name, report=progress)
             datasets += [Path(folder) / name / sweep.folder(number) for number in range(seeds)]
         evaluation = evaluate(
-            datasets, Path(folder) / "scores", methods=methods, budgets=budgets, report=progress
+            datasets,
+            Path(folder) / "scores",
+            methods=methods_for(full_light=False),
+            budgets=budgets,
+            report=progress,
         )
     table = _rows(means(evaluation.frame))
     return Measured(table, _ratios(table), sorted({*evaluation.frame["seed"].astype(int).tolist()}))
@@ -96,22 +94,19 @@ def _rows(means: "DataFrame") -> list[Row]:
         scales = {
             name: 1e3 if name == "time_ms" else 100 if name.endswith("percent") else 1 for name in columns
         }
-        values = {name: _value(of[key], scales[name]) for name, key in columns.items() if key in of}
+        values = {name: value_of(of[key], scales[name]) for name, key in columns.items() if key in of}
         rows.append(Row(DEPTH if is_depth else REMOVAL, method, where, values))
         if "bound_px" in of:
-            bounds[scene, light] = Row(BOUND, "Cramer-Rao bound", where, {"sigma_px": _value(of["bound_px"])})
+            bounds[scene, light] = Row(
+                BOUND, "Cramer-Rao bound", where, {"sigma_px": value_of(of["bound_px"])}
+            )
     return [*rows, *bounds.values()]
 
 
-def _value(row: Any, scale: float = 1.0) -> Value:
-    low, high = (None if np.isnan(end) else scale * end for end in (row.low, row.high))
-    return Value(scale * row.mean, low, high)
-
-
-def _ratios(rows: list[Row]) -> list[Ratio]:
+def _ratios(rows: list[Row]) -> dict[str, Value]:
     """How many times more depths the default method has within 1 px than the best plane sweep."""
     measured, sweeps = Measured(rows), {*map(depth_name, SWEEPS)}
-    ratios: list[Ratio] = []
+    ratios: dict[str, Value] = {}
     for row in measured.of(DEPTH):
         if row.name == DEFAULT:
             others = [each for each in measured.of(DEPTH, **row.parameters) if each.name in sweeps]
@@ -120,7 +115,7 @@ def _ratios(rows: list[Row]) -> list[Ratio]:
                 for some in ([row], others)
             )
             name = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons: depths within"
-            ratios.append(Ratio(f"{name} 1 px by {DEFAULT} against the best sweep", Value(own / best), 1.0))
+            ratios[f"{name} 1 px by {DEFAULT} against the best sweep"] = Value(own / best)
     return ratios
 
 

@@ -6,15 +6,18 @@ many samples and draws and estimates the same things by the simplest means.
 
 import json
 import shutil
+import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.figures import bars
-from benchmarks.processes import Finished, run_process
 from benchmarks.results import Measured, Row, Size, Study, Value
+from benchmarks.scenes import film
 from benchmarks.timing import median_of, ratio_of
 from simgen.spec.recipe import load_recipe
 
@@ -39,6 +42,17 @@ print(json.dumps(outcome.timings_s))
 """What `pcii run` does, but for the command line; it tells the seconds of its stages."""
 ASIDE = "everything else"
 """Imports, starting and stopping: what is in no stage."""
+POLL_S = 0.02
+"""Between two looks at the memory of a process."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """Wall seconds, peak resident memory in MB (None where the system does not tell), standard output."""
+
+    seconds: float
+    peak_mb: float | None
+    output: str
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
@@ -71,7 +85,7 @@ def measure(rows: int, side_px: int, repeats: int) -> Measured:
     found += [
         Row(STAGES, name, {"stage": stage}, {"time_s": _spread(s)}) for (name, stage), s in stages.items()
     ]
-    ratios = [ratio_of(f"{OWN} against {PLAIN}", totals[PLAIN], totals[OWN])]
+    ratios = {f"{OWN} against {PLAIN}": ratio_of(totals[PLAIN], totals[OWN])}
     return Measured(found, ratios, [load_recipe("paper")[0].seed])
 
 
@@ -83,11 +97,9 @@ def _spread(samples: list[float]) -> Value:
 
 def _ours(out: Path, rows: int, side_px: int, samples: int) -> tuple[dict[str, Finished], dict[str, float]]:
     """`simgen generate` and the work of `pcii run`, with the seconds that manifest and analysis tell."""
-    settings = [
-        f"grid.rows={rows}", f"grid.cols={rows}", f"grid.height={side_px}", f"grid.width={side_px}",
-        f"grid.pixel_mm={36.0448 / side_px}", f"grid.pitch_mm=[{45 / (rows - 1)}, {45 / (rows - 1)}]",
-        f"render.samples_per_pixel={samples}",
-    ]  # fmt: skip
+    pitch_mm = 45 / (rows - 1)
+    cameras = f"grid.rows={rows}", f"grid.cols={rows}", f"grid.pitch_mm=[{pitch_mm}, {pitch_mm}]"
+    settings = [*film(side_px), *cameras, f"render.samples_per_pixel={samples}"]
     options = [part for setting in settings for part in ("--set", setting)]
     data, results = out / "data", out / "results"
     made = run_process([str(BIN / "simgen"), "generate", "paper", "--out", str(data), *options])
@@ -106,6 +118,38 @@ def _plain(out: Path, rows: int, side_px: int, samples: int) -> tuple[dict[str, 
     return {PLAIN: finished}, json.loads(finished.output)
 
 
+def run_process(command: Sequence[str]) -> Finished:
+    """Run a command to its end; `CalledProcessError` with its messages if it fails.
+
+    The peak is of the process itself. The system's count of children would not do: it hands on the peak of
+    the process that started them.
+    """
+    start, peak = time.perf_counter(), None
+    # Files, since a pipe that nobody reads stops who writes much into it.
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as messages:
+        with subprocess.Popen(command, stdout=output, stderr=messages) as process:
+            while process.poll() is None:
+                peak = _peak_mb(process.pid) or peak
+                time.sleep(POLL_S)
+            seconds = time.perf_counter() - start
+        output.seek(0)
+        messages.seek(0)
+        if process.returncode:
+            fault = process.returncode, list(command), output.read(), messages.read()
+            raise subprocess.CalledProcessError(*fault)
+        return Finished(seconds, peak, output.read())
+
+
+def _peak_mb(pid: int) -> float | None:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return None
+    return next(
+        (int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmHWM")), None
+    )
+
+
 def draw(figure: "Figure", measured: Measured) -> None:
     """Seconds of each stage, ours and the plain script's."""
     panels = figure.subplots(1, 2, sharex=True)
@@ -120,9 +164,10 @@ def draw(figure: "Figure", measured: Measured) -> None:
 def reading(measured: Measured) -> str:
     """How to read it: both totals, and what the plain one leaves out."""
     own, plain = (measured.one(WHOLE, name).values["time_s"].value for name in (OWN, PLAIN))
+    ratio = measured.ratios[f"{OWN} against {PLAIN}"].value
     return (
         f"What does the whole job take, from a recipe to a report with masks, depth and scores? {own:.1f} s"
-        f" where a plain script takes {plain:.1f} s, {measured.ratio(f'{OWN} against {PLAIN}'):.2f} times"
+        f" where a plain script takes {plain:.1f} s, {ratio:.2f} times"
         " as fast; bars are the median run, with the least and the most where runs are few. The plain"
         " script does less for its time: its counts have rendering noise, its masks are a threshold and"
         " its depth is a plane sweep by variance, nothing is checked, hashed or can be resumed, and"

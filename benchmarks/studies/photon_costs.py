@@ -1,79 +1,66 @@
-"""What a photon costs at the paper's size: thinning against dense rendering, growth, and drawn scenes.
+"""What a photon costs at the paper's size: thinning against dense rendering, and growth.
 
 Dense views are timed on a few views and scaled to all, since each costs the same.
 """
 
-import tempfile
-import time
 from collections.abc import Mapping
-from pathlib import Path
-from statistics import median
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks.figures import bars, curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
-from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import FIRST_NUMBER, KINDS, film, setup_of
-from benchmarks.timing import median_of, ratio_of, side_by_side, timed
+from benchmarks.results import Measured, Row, Size, Study, Value
+from benchmarks.scenes import film, setup_of
+from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.types.camera_grid import CameraGrid
-from simgen.dataset.generation import generate
-from simgen.dataset.prepared import prepare
-from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.recipe import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER, COSTS, GROWTH, DRAWN = (
-    "Photon counts of the paper's recipe",
-    "Cost of each, which the choice between both ways goes by",
-    "Thinning of two views, by photons",
-    "Drawn scenes, thinned",
-)
+PAPER = "Photon counts of the paper's recipe"
+COSTS = "Cost of each, which the choice between both ways goes by"
+GROWTH = "Thinning of two views, by photons"
 DENSE = "dense + Poisson"
 BASE = "thinning, 1000 photons per view"
-OTHERS = {
-    "thinning, 16 times as many pixels": (4, []),
-    "thinning, 10 000 photons per view": (1, ["photons.budget=10000"]),
-}
+AGAINST_16 = "thinning against dense with 16 samples, the paper's recipe"
+FINER = "thinning, 16 times as many pixels"
+BRIGHTER = "thinning, 10 000 photons per view"
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
-    "quick": {"side_px": 1024, "repeats": 6, "dense_views": 1, "most_photons": 5, "drawn": 0},
-    "full": {"side_px": 1024, "repeats": 12, "dense_views": 4, "most_photons": 7, "drawn": 4},
+    "quick": {"side_px": 1024, "repeats": 6, "dense_views": 1, "most_photons": 5},
+    "full": {"side_px": 1024, "repeats": 12, "dense_views": 4, "most_photons": 7},
 }
 
 
-def measure(side_px: int, repeats: int, dense_views: int, most_photons: int, drawn: int) -> Measured:
-    """The paper's recipe, growth up to ten to the power `most_photons`, and so many scenes of each kind."""
+def measure(side_px: int, repeats: int, dense_views: int, most_photons: int) -> Measured:
+    """The paper's recipe, and growth up to ten to the power `most_photons`."""
     rows, ratios = _paper(side_px, repeats, dense_views)
-    rows += _growth(side_px, repeats, most_photons)
-    if drawn:
-        rows += _drawn(drawn, rows[0].values["time_ms"].value)
-    return Measured(rows, ratios, [1])
+    return Measured(rows + _growth(side_px, repeats, most_photons), ratios, [1])
 
 
-def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], list[Ratio]]:
-    recipe, _ = load_recipe("paper", film(side_px))
-    setup, logs = setup_of(recipe), dict[str, dict[str, Any]]()
+def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dict[str, Value]]:
+    recipes = {
+        BASE: load_recipe("paper", film(side_px))[0],
+        FINER: load_recipe("paper", film(4 * side_px))[0],
+        BRIGHTER: load_recipe("paper", [*film(side_px), "photons.budget=10000"])[0],
+    }
+    setups = {name: setup_of(recipe) for name, recipe in recipes.items()}
+    setup, photons, logs = setups[BASE], recipes[BASE].photons, dict[str, dict[str, Any]]()
 
-    def thinning(name: str, own: Recipe, own_setup: Setup, seed: int) -> None:
-        logs[name] = thin_photons(own_setup, own.photons, seed=seed)[1]
+    def thin(name: str, seed: int) -> None:
+        logs[name] = thin_photons(setups[name], recipes[name].photons, seed=seed)[1]
 
-    def dense(samples: int, seed: int) -> None:
+    def render(samples: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
         for view in range(dense_views):
-            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, recipe.photons.budget, rng)
+            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, photons.budget, rng)
 
-    works: dict[str, Any] = {BASE: lambda n: thinning(BASE, recipe, setup, n)}
-    for name, (finer, settings) in OTHERS.items():
-        own, _ = load_recipe("paper", [*film(finer * side_px), *settings])
-        own_setup = setup_of(own)
-        works[name] = lambda n, name=name, own=own, s=own_setup: thinning(name, own, s, n)
-    for samples in (1, 16):
-        works[f"{DENSE}, samples: {samples}"] = lambda n, samples=samples: dense(samples, n)
+    works = {name: partial(thin, name) for name in recipes}
+    works |= {dense_name(samples): partial(render, samples) for samples in (1, 16)}
     seconds = side_by_side(works, repeats)
     scale = setup.grid.view_count / dense_views
     rows: list[Row] = []
@@ -84,23 +71,25 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], lis
             values["kept_percent"] = Value(100 * logs[name]["kept_share"])
             values["above_bound_percent"] = Value(100 * logs[name]["paths_above_bound"] / max(kept, 1))
         rows.append(Row(PAPER, name, {}, values))
-    ratios = [
-        ratio_of(
-            f"thinning against dense with {samples} samples, the paper's recipe",
-            seconds[f"{DENSE}, samples: {samples}"],
-            seconds[BASE],
-            scale=scale,
+    ratios = {
+        f"thinning against dense with {samples} samples, the paper's recipe": ratio_of(
+            seconds[dense_name(samples)], seconds[BASE], scale
         )
         for samples in (1, 16)
-    ]
+    }
     return [*rows, *_costs(seconds, scale, setup.grid)], ratios
+
+
+def dense_name(samples: int) -> str:
+    """What dense rendering with so many samples per pixel is called."""
+    return f"{DENSE}, samples: {samples}"
 
 
 def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> list[Row]:
     """What `simgen.photons.counting_plan` chooses by."""
     pixels = grid.view_count * grid.height * grid.width
-    base, more = (np.array(seconds[name]) for name in (BASE, "thinning, 10 000 photons per view"))
-    one, sixteen = (scale * np.array(seconds[f"{DENSE}, samples: {samples}"]) for samples in (1, 16))
+    base, more = (np.array(seconds[name]) for name in (BASE, BRIGHTER))
+    one, sixteen = (scale * np.array(seconds[dense_name(samples)]) for samples in (1, 16))
     sample = (sixteen - one) / (15 * pixels)
     found = {
         "a photon more, by thinning": (more - base) / (9000 * grid.view_count),
@@ -112,51 +101,23 @@ def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> l
 
 def _growth(side_px: int, repeats: int, most: int) -> list[Row]:
     """Time against photons, from ten to ten to this power in a view."""
-    rows: list[Row] = []
-    for power in range(1, most + 1):
-        recipe, _ = load_recipe(
-            "paper", ["grid.rows=1", "grid.cols=2", *film(side_px), f"photons.budget={10**power}"]
+    small = ["grid.rows=1", "grid.cols=2", *film(side_px)]
+    recipes = {
+        10**n: load_recipe("paper", [*small, f"photons.budget={10**n}"])[0] for n in range(1, most + 1)
+    }
+    setup = setup_of(recipes[10])
+    works = {
+        n: lambda seed, own=own: thin_photons(setup, own.photons, seed=seed) for n, own in recipes.items()
+    }
+    return [
+        Row(
+            GROWTH,
+            "thinning",
+            {"photons_per_view": float(photons)},
+            {"time_ms": median_of(taken, 1e3), "each_us": median_of(taken, 1e6 / (2 * photons))},
         )
-        setup = setup_of(recipe)
-        taken, _ = timed(lambda n, s=setup, p=recipe.photons: thin_photons(s, p, seed=n), repeats)
-        values = {
-            "time_ms": median_of(taken, 1e3),
-            "each_us": median_of(taken, 1e6 / (2 * 10**power)),
-        }
-        rows.append(Row(GROWTH, "thinning", {"photons_per_view": 10.0**power}, values))
-    return rows
-
-
-def _drawn(each: int, base_ms: float) -> list[Row]:
-    """Scenes drawn at random, so many of each kind, against the paper's scene; and each as a new dataset."""
-    rows: list[Row] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for kind in KINDS:
-            relative, kept, raised, fresh = [], [], [], []
-            for number in range(FIRST_NUMBER, FIRST_NUMBER + each):
-                recipe = Recipe(scene=f"drawn_{kind}", scene_number=number, seed=number)
-                start = time.perf_counter()
-                generate(recipe, Path(), Path(folder) / f"{kind}_{number}")
-                fresh.append(time.perf_counter() - start)
-                grid, depth = recipe.grid.camera_grid(), recipe.render.max_depth
-                setup = Setup(prepare(recipe, Path()).render_scene(), grid, recipe.cfa, depth)
-                logs: list[dict[str, Any]] = []
-                works = {
-                    kind: lambda n, s=setup, p=recipe.photons, logs=logs: logs.append(
-                        thin_photons(s, p, seed=n)[1]
-                    )
-                }
-                relative.append(1e3 * median(side_by_side(works)[kind]) / base_ms)
-                kept.append(100 * logs[-1]["kept_share"])
-                raised.append(float(logs[-1]["bound_raised"]))
-            values = {
-                "times_the_papers": relative,
-                "kept_percent": kept,
-                "raised": raised,
-                "new_dataset_s": fresh,
-            }
-            rows.append(Row(DRAWN, kind, {}, {name: mean_of(found) for name, found in values.items()}))
-    return rows
+        for photons, taken in side_by_side(works, repeats).items()
+    ]
 
 
 def draw(figure: "Figure", measured: Measured) -> None:
@@ -172,7 +133,7 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def reading(measured: Measured) -> str:
     """How to read it: the ratio to dense rendering, and what a photon costs."""
-    ratio = measured.ratios[1].ratio.value
+    ratio = measured.ratios[AGAINST_16].value
     rows = measured.of(GROWTH)
     few, many = (row.values["time_ms"].value for row in (rows[0], rows[-1]))
     cost = measured.one(COSTS, "a photon more, by thinning").values["cost_us"].value

@@ -4,24 +4,19 @@ Thinning draws each photon by light paths of its own; the other way renders all 
 draws Poisson counts from them. Scenes from matt to glass, whose paths differ ever more in what they carry.
 """
 
-import math
-import time
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
-from statistics import median
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks.figures import curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
-from benchmarks.photon_distance import Rates, distances
-from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
+from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
-from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons, load_recipe
 
 if TYPE_CHECKING:
@@ -32,86 +27,92 @@ SCENES = {"matt": "paper", "glossy": "glossy", "glass": "glass"}
 VIEWS = ["grid.rows=1", "grid.cols=2", "products.radiance=none"]
 THINNING, DENSE = "thinning", "dense + Poisson"
 DISTANCES = "Time of a view, and distance from the true distribution (1 is exact)"
-CROSSOVERS = "Photons per view up to which thinning takes less time than so many samples"
 USUAL = 1000.0
 """Photons per view that ratios are told of."""
 EXCESS = 0.01
 """Dispersion above 1 that is small: `simgen` allows itself no more."""
+TILE_PX = 16
+GROUPS = 16
+"""Pixels are divided at random into so many groups, whose figures give the intervals."""
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {
         "side_px": 128,
         "samples": (1, 4, 16, 64),
-        "budgets": (10.0, 1e3, 1e4, 1e5),
+        "budgets": (10.0, USUAL, 1e4, 1e5),
         "repeats": 6,
         "reference": 512,
     },
     "full": {
         "side_px": 256,
         "samples": (1, 4, 16, 64, 256),
-        "budgets": (10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7),
+        "budgets": (10.0, 100.0, USUAL, 1e4, 1e5, 1e6, 1e7),
         "repeats": 12,
         "reference": 16384,
     },
 }
 
 
+@dataclass(frozen=True)
+class Rates:
+    """Expected photons (V, H, W) of a budget of one photon per view, and their variance."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+
+
 def measure(
-    side_px: int,
-    samples: Sequence[int],
-    budgets: Sequence[float],
-    repeats: int,
-    reference: int,
-    scenes: Mapping[str, str] = SCENES,
+    side_px: int, samples: Sequence[int], budgets: Sequence[float], repeats: int, reference: int
 ) -> Measured:
-    """Both ways, scene by scene and budget by budget; rates are those of `reference` samples."""
+    """All ways take turns, scene by scene and budget by budget; rates are those of `reference` samples."""
     rows: list[Row] = []
-    ratios: list[Ratio] = []
-    usual = min(budgets, key=lambda budget: abs(budget - USUAL))
-    for scene, name in scenes.items():
+    ratios: dict[str, Value] = {}
+    for scene, name in SCENES.items():
         recipe, _ = load_recipe(name, [*VIEWS, *film(side_px)])
         setup = setup_of(recipe)
         rates = true_rates(setup, reference)
-        seconds: dict[tuple[str, float], list[float]] = {}
         for budget in budgets:
             photons = recipe.photons.model_copy(update={"budget": budget})
-            times, counts = _thinned(setup, photons, repeats)
-            seconds[THINNING, budget] = times
-            rows.append(_row(scene, THINNING, 0, budget, times, counts, rates))
-        for number in samples:
-            for budget, (times, counts) in _dense(setup, budgets, number, repeats).items():
-                seconds[dense_name(number), budget] = times
-                rows.append(_row(scene, DENSE, number, budget, times, counts, rates))
-        ratios.append(
-            _ratio(
-                f"{scene}: thinning against dense with {max(samples)} samples, {usual:g} photons per view",
-                setup,
-                recipe.photons.model_copy(update={"budget": usual}),
-                max(samples),
-                repeats,
-            )
-        )
-        rows += _crossovers(scene, samples, seconds)
+            seconds, counts = compared(setup, photons, (0, *samples), repeats)
+            for number, taken in seconds.items():
+                where = {"scene": scene, "samples": number, "photons_per_view": budget}
+                values = {"time_ms": median_of(taken, 1e3 / setup.grid.view_count)}
+                values |= distances(counts[number], rates, budget)
+                rows.append(Row(DISTANCES, DENSE if number else THINNING, where, values))
+            if budget == USUAL:
+                most = max(samples)
+                pair = f"{scene}: thinning against dense with {most} samples, {budget:g} photons per view"
+                ratios[pair] = ratio_of(seconds[most], seconds[0])
     return Measured(rows, ratios, list(range(1, repeats + 1)))
 
 
-def _ratio(name: str, setup: Setup, photons: Photons, samples: int, repeats: int) -> Ratio:
-    """Both ways in turns."""
+def compared(
+    setup: Setup, photons: Photons, ways: Sequence[int], repeats: int
+) -> tuple[dict[int, list[float]], dict[int, np.ndarray]]:
+    """Seconds and counts (R, V, H, W) of each way, which is its samples per pixel, or 0 for thinning."""
+    counts: dict[int, list[np.ndarray]] = {samples: [] for samples in ways}
+    works = {
+        samples: lambda seed, samples=samples: counts[samples].append(
+            counts_of(setup, photons, samples, seed)
+        )
+        for samples in ways
+    }
+    return side_by_side(works, repeats), {samples: np.array(found[1:]) for samples, found in counts.items()}
 
-    def dense(number: int) -> None:
-        for view in range(setup.grid.view_count):
-            mosaic, rng = rendered_mosaic(setup, view, samples, number), np.random.default_rng(number)
-            drawn_counts(mosaic, setup.cfa, photons.budget, rng)
 
-    works = {THINNING: lambda n: thin_photons(setup, photons, seed=n), DENSE: dense}
-    seconds = side_by_side(works, repeats)
-    return ratio_of(name, seconds[DENSE], seconds[THINNING])
-
-
-def dense_name(samples: int) -> str:
-    """Key of dense rendering with so many samples per pixel."""
-    return f"{DENSE}, {samples}"
+def counts_of(setup: Setup, photons: Photons, samples: int, seed: int) -> np.ndarray:
+    """Counts (V, H, W) by dense rendering with so many samples per pixel, by thinning with 0."""
+    grid = setup.grid
+    if not samples:
+        table, _ = thin_photons(setup, photons, seed=seed)
+        size = grid.view_count * grid.height * grid.width
+        flat = np.bincount(table.flat_pixels(grid), weights=table.n, minlength=size)
+        return flat.reshape(grid.view_count, grid.height, grid.width)
+    rng = np.random.default_rng([seed, int(photons.budget)])
+    seeds = [1 + seed * grid.view_count + view for view in range(grid.view_count)]
+    mosaics = [rendered_mosaic(setup, view, samples, own) for view, own in enumerate(seeds)]
+    return np.array([drawn_counts(mosaic, setup.cfa, photons.budget, rng) for mosaic in mosaics])
 
 
 def true_rates(setup: Setup, samples: int) -> Rates:
@@ -124,74 +125,45 @@ def true_rates(setup: Setup, samples: int) -> Rates:
     return Rates(halves.mean(axis=0), (halves[0] - halves[1]) ** 2 / 4)
 
 
-def _thinned(setup: Setup, photons: Photons, repeats: int) -> tuple[list[float], np.ndarray]:
-    """Seconds of each repeat, and counts (R, V, H, W)."""
-    seconds, counts = [], []
-    thin_photons(setup, photons, seed=0)
-    for seed in range(1, repeats + 1):
-        start = time.perf_counter()
-        drawn, _ = thin_photons(setup, photons, seed=seed)
-        seconds.append(time.perf_counter() - start)
-        counts.append(as_images(drawn, setup))
-    return seconds, np.array(counts)
+def distances(counts: np.ndarray, rates: Rates, budget: float) -> dict[str, Value]:
+    """Distances of counts (R, V, H, W) of at least two repeats from Poisson counts; all are 1 for exact ones.
+
+    The variance of the rates is no fault of the counts, and is taken into account. `dispersion`: variance
+    over mean of the repeats, pooled over pixels; noise in the rates makes it larger. `tile_chi_square`: of
+    tiles of `TILE_PX`, by degree of freedom, the mean over repeats. `rmse_of_mean`: the root mean square
+    error of the mean over repeats, relative to that of exact counts.
+    """
+    repeats = len(counts)
+    expected, variance = budget * rates.mean, budget**2 * rates.variance
+    group = np.random.default_rng(0).integers(0, GROUPS, expected.shape).ravel()
+
+    def by_group(values: np.ndarray) -> np.ndarray:
+        return np.bincount(group, weights=values.ravel(), minlength=GROUPS)
+
+    light = by_group(counts.mean(axis=0))
+    spread = by_group(counts.var(axis=0, ddof=1))
+    squares = by_group((counts.mean(axis=0) - expected) ** 2)
+    exact = by_group(expected / repeats + variance)
+    lit = light > 0
+    return {
+        "dispersion": mean_of(list(spread[lit] / light[lit])),
+        "tile_chi_square": mean_of([_chi_square(one, expected, variance) for one in counts]),
+        "rmse_of_mean": mean_of(list(np.sqrt(squares / exact))),
+    }
 
 
-def as_images(drawn: PhotonTable, setup: Setup) -> np.ndarray:
-    """Counts (V, H, W) of photons in a table."""
-    grid = setup.grid
-    size = grid.view_count * grid.height * grid.width
-    flat = np.bincount(drawn.flat_pixels(grid), weights=drawn.n, minlength=size)
-    return flat.reshape(grid.view_count, grid.height, grid.width)
+def _chi_square(counts: np.ndarray, expected: np.ndarray, variance: np.ndarray) -> float:
+    seen, wanted, doubt = (tile_sums(one.astype(np.float64)) for one in (counts, expected, variance))
+    lit = wanted > 0
+    return float(((seen - wanted)[lit] ** 2 / (wanted + doubt)[lit]).mean())
 
 
-def _dense(
-    setup: Setup, budgets: Sequence[float], samples: int, repeats: int
-) -> dict[float, tuple[list[float], np.ndarray]]:
-    """Of each budget seconds of each repeat, and counts; a rendering serves all budgets."""
-    grid, views = setup.grid, range(setup.grid.view_count)
-    seconds: dict[float, list[float]] = {budget: [] for budget in budgets}
-    counts = {budget: np.zeros((repeats, len(views), grid.height, grid.width)) for budget in budgets}
-    rendered_mosaic(setup, 0, samples, 0)
-    for repeat in range(repeats):
-        start = time.perf_counter()
-        mosaics = [rendered_mosaic(setup, view, samples, 1 + repeat * len(views) + view) for view in views]
-        rendering = time.perf_counter() - start
-        for budget in budgets:
-            rng = np.random.default_rng([repeat, int(budget)])
-            start = time.perf_counter()
-            for view in views:
-                counts[budget][repeat, view] = drawn_counts(mosaics[view], setup.cfa, budget, rng)
-            seconds[budget].append(rendering + time.perf_counter() - start)
-    return {budget: (seconds[budget], counts[budget]) for budget in budgets}
-
-
-def _row(
-    scene: str, way: str, samples: int, budget: float, seconds: list[float], counts: np.ndarray, rates: Rates
-) -> Row:
-    parameters = {"scene": scene, "samples": samples, "photons_per_view": budget}
-    values = {"time_ms": median_of(seconds, 1e3 / counts.shape[1])} | distances(counts, rates, budget)
-    return Row(DISTANCES, way, parameters, values)
-
-
-def _crossovers(
-    scene: str, samples: Sequence[int], seconds: Mapping[tuple[str, float], list[float]]
-) -> list[Row]:
-    """At how many photons thinning takes as long as so many samples, between the budgets that were tried."""
-    budgets = sorted({budget for _, budget in seconds})
-    found: list[Row] = []
-    for number in samples:
-        gap = [
-            math.log(median(seconds[THINNING, budget]) / median(seconds[dense_name(number), budget]))
-            for budget in budgets
-        ]
-        crossing = budgets[0] if gap[0] > 0 else budgets[-1]
-        for (low, high), (before, after) in zip(pairwise(budgets), pairwise(gap), strict=True):
-            if before <= 0 < after:
-                crossing = low * (high / low) ** (before / (before - after))
-        side = "above" if gap[-1] <= 0 else "below" if gap[0] > 0 else "at"
-        parameters = {"scene": scene, "samples": number, "where": side}
-        found.append(Row(CROSSOVERS, THINNING, parameters, {"photons_per_view": Value(crossing)}))
-    return found
+def tile_sums(images: np.ndarray) -> np.ndarray:
+    """Sums over whole tiles of (V, H, W); what is left over at the ends is not counted."""
+    V, H, W = images.shape
+    h, w = H // TILE_PX, W // TILE_PX
+    whole = images[:, : h * TILE_PX, : w * TILE_PX]
+    return whole.reshape(V, h, TILE_PX, w, TILE_PX).sum(axis=(2, 4))
 
 
 def draw(figure: "Figure", measured: Measured) -> None:
@@ -239,8 +211,8 @@ def reading(measured: Measured) -> str:
         f" {dispersion(DENSE, last, samples):.2f}, since noise of the rendering is in its rates (points"
         " above the dotted line have more than the 1 % that is allowed). Thinning takes time with the"
         " photons and rendering with pixels and samples: on this small film thinning is"
-        f" {measured.ratios[0].ratio.value:.2g} times as fast as {samples} samples, and the table of"
-        " crossovers tells where it loses."
+        f" {next(iter(measured.ratios.values())).value:.2g} times as fast as {samples} samples at"
+        f" {USUAL:g} photons per view in the {first} scene."
     )
 
 

@@ -5,17 +5,16 @@ Fixed costs weigh most on small scenes, so skips that save little there are meas
 
 import tempfile
 import time
-import tracemalloc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks.figures import bars
-from benchmarks.results import Measured, Row, Size, Study, Value
-from benchmarks.scenes import FIRST_NUMBER, KINDS
-from benchmarks.skips import SKIPS, Arrays, Skip, World
+from benchmarks.results import Measured, Row, Size, Study
+from benchmarks.scenes import film
+from benchmarks.skip_pairs import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
 from simgen.spec.recipe import Recipe, load_recipe
 
@@ -26,6 +25,10 @@ TABLE = "Every skip, on against off"
 REALISTIC = "Skips that save little there, at realistic size"
 LITTLE_PERCENT = 5.0
 """A skip that saves less is not worth its code."""
+KINDS = "plain", "textured", "cards", "room", "crossing", "leaves", "checks", "shiny"
+"""Kinds of drawn scenes that studies are of."""
+FIRST_NUMBER = 100
+"""Numbers of drawn scenes from here on are for figures, those below for tuning."""
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
@@ -34,28 +37,23 @@ SIZES: Mapping[Size, Mapping[str, Any]] = {
 }
 
 
-def measure(
-    scenes: int, side_px: int, realistic_px: int, repeats: int, skips: Sequence[Skip] = SKIPS
-) -> Measured:
-    """Every skip on so many random scenes, and on one before them that warms up and shows the memory.
+def measure(scenes: int, side_px: int, realistic_px: int, repeats: int) -> Measured:
+    """Every skip on so many random scenes, and on one before them that warms up.
 
     Those that save little are then repeated with the paper's cameras on films of `realistic_px`.
     """
-    seconds: dict[str, tuple[list[float], list[float]]] = {skip.name: ([], []) for skip in skips}
-    peaks: dict[str, tuple[float, float]] = {}
+    seconds: dict[str, tuple[list[float], list[float]]] = {skip.name: ([], []) for skip in SKIPS}
     same = dict.fromkeys(seconds, 0)
     for number in range(scenes + 1):
         with tempfile.TemporaryDirectory() as folder:
             world = random_world(number, side_px, Path(folder))
             world.prepare_all()
-            for skip in skips:
-                if number == 0:
-                    peaks[skip.name] = _peak_mb(skip.on, world, "on"), _peak_mb(skip.off, world, "off")
-                else:
-                    same[skip.name] += _timed_pair(skip, world, number, seconds[skip.name])
-    rows = [_row(TABLE, skip, *seconds[skip.name], *peaks[skip.name], same[skip.name]) for skip in skips]
-    ratios = [ratio_of(skip.name, seconds[skip.name][1], seconds[skip.name][0]) for skip in skips]
-    little = [skip for skip, row in zip(skips, rows, strict=True) if _saved(row) < LITTLE_PERCENT]
+            for skip in SKIPS:
+                is_same = _timed_pair(skip, world, number, seconds[skip.name] if number else ([], []))
+                same[skip.name] += is_same and number > 0
+    rows = [_row(TABLE, skip, *seconds[skip.name], same[skip.name]) for skip in SKIPS]
+    ratios = {name: ratio_of(off, on) for name, (on, off) in seconds.items()}
+    little = [skip for skip, row in zip(SKIPS, rows, strict=True) if _saved(row) < LITTLE_PERCENT]
     rows += _realistic_rows(little, realistic_px, repeats)
     return Measured(rows, ratios, list(range(1, scenes + 1)))
 
@@ -76,22 +74,15 @@ def _realistic_rows(skips: Sequence[Skip], side_px: int, repeats: int) -> list[R
     """The skips with the paper's cameras and scene, after a pair that warms up."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
-        world = realistic_world(side_px, Path(folder))
+        recipe, recipe_folder = load_recipe("paper", [*film(side_px), "products.radiance=none"])
+        world = World(recipe, recipe_folder, Path(folder))
         world.prepare_all()
         for skip in skips:
             _timed_pair(skip, world, 0, ([], []))
             seconds: tuple[list[float], list[float]] = [], []
             same = sum(_timed_pair(skip, world, number, seconds) for number in range(1, repeats + 1))
-            peaks = _peak_mb(skip.on, world, "on"), _peak_mb(skip.off, world, "off")
-            rows.append(_row(REALISTIC, skip, *seconds, *peaks, same))
+            rows.append(_row(REALISTIC, skip, *seconds, same))
     return rows
-
-
-def realistic_world(side_px: int, folder: Path) -> World:
-    """The paper's scene, cameras and photons, on a film of another number of pixels."""
-    film = f"grid.pixel_mm={36.0448 / side_px}", f"grid.height={side_px}", f"grid.width={side_px}"
-    recipe, recipe_folder = load_recipe("paper", [*film, "products.radiance=none"])
-    return World(recipe, recipe_folder, folder)
 
 
 def random_world(number: int, side_px: int, folder: Path) -> World:
@@ -132,35 +123,17 @@ def are_same(one: Arrays, other: Arrays) -> bool:
     )
 
 
-def _peak_mb(work: Callable[[World, str], Arrays], world: World, which: str) -> float:
-    """Peak of what Python and NumPy take during the work; the renderer's own memory is not in it."""
-    tracemalloc.start()
-    work(world, f"memory, {len(list(world.folder.iterdir()))}, {which}")
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak / 2**20
-
-
 def _saved(row: Row) -> float:
     return row.values["time_saved_percent"].value
 
 
-def _memory_saved(row: Row) -> float:
-    on, off = (row.values[f"memory_{which}_mb"].value for which in ("on", "off"))
-    return 100 * (1 - on / off)
-
-
-def _row(
-    table: str, skip: Skip, on: list[float], off: list[float], on_mb: float, off_mb: float, same: int
-) -> Row:
+def _row(table: str, skip: Skip, on: list[float], off: list[float], same: int) -> Row:
     claim = "same bytes" if skip.exact else "same distribution"
     saved = median_of([100 * (1 - a / b) for a, b in zip(on, off, strict=True)])
     values = {
         "time_on_ms": median_of(on, 1e3),
         "time_off_ms": median_of(off, 1e3),
         "time_saved_percent": saved,
-        "memory_on_mb": Value(on_mb),
-        "memory_off_mb": Value(off_mb),
     }
     held = f"{same} of {len(on)}" if skip.exact else "see photon images"
     return Row(table, skip.name, {"claim": claim, "scenes_where_it_holds": held}, values)
@@ -185,10 +158,7 @@ def reading(measured: Measured) -> str:
     little = [row.name for row in rows if _saved(row) < LITTLE_PERCENT]
     told = "all save more than that"
     if little:
-        there = [
-            f"{row.name} ({_saved(row):.0f} % of the time, {_memory_saved(row):.0f} % of the memory)"
-            for row in measured.of(REALISTIC)
-        ]
+        there = [f"{row.name} ({_saved(row):.0f} %)" for row in measured.of(REALISTIC)]
         told = (
             f"less than {LITTLE_PERCENT:g} % is saved by {len(little)} of them. With the paper's cameras and"
             f" scene these save: {'; '.join(there)}"
@@ -197,8 +167,7 @@ def reading(measured: Measured) -> str:
         f"Is skipped work really not missed? Of {len(exact)} skips that claim the same bytes, {hold} gave"
         f" them in all {scenes} random scenes; the other draws anew from the same distribution. Bars are"
         " the share of the time saved on these small scenes, where fixed costs weigh most, and the dotted"
-        f" line is {LITTLE_PERCENT:g} %: {told}. Memory is that of Python and NumPy, without the renderer's"
-        " own."
+        f" line is {LITTLE_PERCENT:g} %: {told}."
     )
 
 

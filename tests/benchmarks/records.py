@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from benchmarks.figures import curve, frame
-from benchmarks.results import Measured, Ratio, Record, Row, Study, Value
+from benchmarks.results import Measured, Record, Row, Study, Value
 
 MEASURED = Measured(
     rows=[
@@ -14,7 +14,7 @@ MEASURED = Measured(
         Row("Errors", "theirs <b>", {"samples": 16}, {"time_ms": Value(8.0)}),
         Row("Memory", "ours", {}, {"peak_mb": Value(1234.0)}),
     ],
-    ratios=[Ratio("ours against theirs", Value(4.0, 3.5, 4.5), asked=3.0), Ratio("memory", Value(1.5))],
+    ratios={"ours against theirs": Value(4.0, 3.5, 4.5), "memory": Value(1.5)},
     seeds=[1, 2],
 )
 
@@ -38,10 +38,18 @@ MACHINE = {"processor": "abacus", "cores": 2, "renderer": "scalar_rgb", "cores_i
 
 def record(**changes: Any) -> Record:
     """The record of a quick run of `STUDY`, with other values of some fields."""
-    own = Record("nothing", "quick", "2026-01-02T03:04:05+00:00", 12.5, MACHINE, {"numpy": "2.1"}, MEASURED)
+    own = Record(
+        "nothing",
+        "quick",
+        "2026-01-02T03:04:05+00:00",
+        12.5,
+        MACHINE,
+        {"commit": "abc", "numpy": "2.1"},
+        MEASURED,
+    )
     return replace(own, **changes)
 
 
 def with_ratios(**ratios: float) -> Record:
     """The record with these ratios instead."""
-    return record(measured=Measured(MEASURED.rows, [Ratio(name, Value(r)) for name, r in ratios.items()]))
+    return record(measured=Measured(MEASURED.rows, {name: Value(ratio) for name, ratio in ratios.items()}))

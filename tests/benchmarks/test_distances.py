@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.photon_distance import Rates, distances
 from benchmarks.studies import radiance_images, sections, skips
+from benchmarks.studies.photon_images import Rates, distances
 
 RATES = np.random.default_rng(5).uniform(0.2, 1.8, (2, 64, 64)) / 64**2
 BUDGET = 5.0 * 64**2

@@ -1,16 +1,16 @@
+import json
 from pathlib import Path
 
 import pytest
 from records import record, with_ratios
 
 from benchmarks import __main__ as command
-from benchmarks.guard import losses, read_reference, reference_of, write_reference
+from benchmarks.guard import losses, reference_of
 from benchmarks.results import write_record
 
 
-def test_a_loss_above_a_quarter_is_named(tmp_path: Path) -> None:
-    write_reference([with_ratios(fast=10.0, slow=2.0)], tmp_path / "reference.json")
-    reference = read_reference(tmp_path / "reference.json")
+def test_a_loss_above_a_quarter_is_named() -> None:
+    reference = reference_of([with_ratios(fast=10.0, slow=2.0)])
     assert losses([with_ratios(fast=7.6, slow=2.5)], reference) == []
     assert losses([with_ratios(fast=7.4, slow=2.0)], reference) == [
         "nothing, fast: 7.4 instead of 10, 26% less"
@@ -38,7 +38,8 @@ def test_the_command_exits_with_1_on_a_planted_loss(
     study = command.STUDIES[0].name
     results = tmp_path / "bench"
     reference = {study: {"size": "quick", "ratios": {"speed": 8.0}}}
-    monkeypatch.setattr(command, "read_reference", lambda: reference)
+    monkeypatch.setattr(command, "REFERENCE", tmp_path / "reference.json")
+    command.REFERENCE.write_text(json.dumps(reference))
     for ratio, code in ((8.0, 0), (5.9, 1)):
         found = with_ratios(speed=ratio)
         write_record(results, record(study=study, measured=found.measured))

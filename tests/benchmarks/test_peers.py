@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.peers import plain_pipeline
 from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
-from benchmarks.textures import Texture, plane_views
+from benchmarks.studies.sections import Texture, plane_views
 from pcii.sections import reconstruct
 from pcii.types import CameraGrid, Views
 

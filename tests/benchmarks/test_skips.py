@@ -3,7 +3,7 @@
 import pytest
 from property_settings import mostly_slow
 
-from benchmarks.skips import SKIPS, World
+from benchmarks.skip_pairs import SKIPS, World
 from benchmarks.studies.skips import are_same, random_world
 
 EXACT = {skip.name: skip for skip in SKIPS if skip.exact}

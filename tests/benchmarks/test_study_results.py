@@ -5,7 +5,7 @@ import pytest
 from records import record
 
 from benchmarks.results import read_record, write_record
-from benchmarks.timing import median_of, ratio_of, side_by_side, timed
+from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.base import InputError
 
 
@@ -31,7 +31,6 @@ def test_works_take_turns_and_the_first_round_is_not_counted() -> None:
     seconds = side_by_side(works, repeats=2)
     assert calls == [("a", 0), ("b", 0), ("a", 1), ("b", 1), ("a", 2), ("b", 2)]
     assert {name: len(taken) for name, taken in seconds.items()} == {"a": 2, "b": 2}
-    assert timed(lambda n: n, repeats=3)[1] == 3
 
 
 def test_intervals_of_medians_are_order_statistics() -> None:
@@ -46,5 +45,4 @@ def test_intervals_of_medians_are_order_statistics() -> None:
 
 def test_ratios_are_taken_round_by_round() -> None:
     # Were they of medians, the slow third round of both would count.
-    found = ratio_of("x", [2.0, 4.0, 90.0], [1.0, 1.0, 30.0], asked=2, scale=10)
-    assert (found.ratio.value, found.asked) == (30, 2)
+    assert ratio_of([2.0, 4.0, 90.0], [1.0, 1.0, 30.0], scale=10).value == 30

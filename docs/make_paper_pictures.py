@@ -1,4 +1,4 @@
-"""Draw docs/overview.jpg, from photons to depth on the paper's scene: `python docs/make_overview.py DATASET`.
+"""Draw docs/overview.jpg and docs/removal.jpg, of the paper's scene: `docs/make_paper_pictures.py DATASET`.
 
 DATASET is what `simgen generate paper -o DATASET --set products.radiance=none` makes.
 """
@@ -16,8 +16,10 @@ from matplotlib.axes import Axes
 import pcii
 from pcii.figures.exposure import filled_means, smoothed, smoothing_for
 from pcii.figures.pictures import depth_image, to_srgb8, white_level
+from pcii.metrics.true_masks import TrueFocus
 from pcii.types.bayer import colour_index
 
+DOCS = Path(__file__).parent
 PART = np.s_[394:640, 300:720]
 """Ball and bird, in pixels of the virtual centre."""
 MIDDLE_PX = 540
@@ -27,16 +29,54 @@ WIDE_IN, GAP_IN, TITLE_IN, EDGE_IN = 2.85, 0.12, 0.36, 0.14
 GROUND, INK, FAINT = "#0d1016", "#eceff4", "#9aa4b2"
 OF_PHOTONS = np.array([[1.0, 0.45, 0.4], [0.5, 0.92, 0.55], [0.5, 0.66, 1.0]])
 """Colours in which photons of red, green and blue pixels are drawn."""
+WINDOW = np.s_[330:700, 180:850]
+"""What the picture of the steps shows."""
 
 
-def main(dataset: Path) -> None:
-    """Write the picture beside this script."""
-    data = pcii.open_dataset(dataset)
-    truth, counts, z_mm = data.truth, data.counts, data.analysis["z_mm"]
-    if truth is None:
-        raise SystemExit(f"{dataset}: has no truth")
+def draw_steps(data: pcii.Dataset, truth: pcii.Truth) -> None:
+    """Each of the three steps at both depths, from the sections to the masks."""
+    z_mm = data.analysis["z_mm"]
+    focus = pcii.segment(data.counts, z_mm, method="three-step")
+    true_masks = TrueFocus(focus.sections.planes, truth).by_object
+    steps = focus.steps
+    estimate = focus.sections.estimate
+    white = white_level(estimate[0])
+    spread = np.quantile(steps["variance"], 0.999)
+    bits = steps["entropy"][steps["entropy"] > 0]
+    shown = [
+        ("section", lambda p: to_srgb8(estimate[p], white), {}),
+        ("mean of non-zero samples", lambda p: steps["mean"][p], {"cmap": "magma"}),
+        ("variance", lambda p: steps["variance"][p], {"cmap": "magma", "vmin": 0, "vmax": spread}),
+        ("threshold T", lambda p: steps["threshold"][p], {"cmap": "magma", "vmin": 0, "vmax": spread}),
+        ("1: variance at most T", lambda p: steps["kept"][p], {"cmap": "gray"}),
+        ("Roberts magnitude", lambda p: steps["edges"][p], {"cmap": "gray", "vmin": 0, "vmax": 3}),
+        ("2: bright, cut into regions", lambda p: _mixed(steps["regions"][p] * steps["bright"][p]), {}),
+        ("entropy, bits", lambda p: steps["entropy"][p], {"vmin": bits.min(), "vmax": bits.max()}),
+        ("3: lowest entropy here", lambda p: steps["winner"][p] == p, {"cmap": "gray"}),
+        ("in focus", lambda p: focus.in_focus[p], {"cmap": "gray"}),
+        ("truth", lambda p: true_masks[p], {"cmap": "gray"}),
+    ]
+    figure, axes = plt.subplots(len(shown), 2, figsize=(5.2, 1.48 * len(shown)), layout="constrained")
+    for row, (title, image, style) in zip(axes, shown, strict=True):
+        for plane, axis in enumerate(row):
+            axis.imshow(image(plane)[WINDOW], interpolation="nearest", **style)
+            axis.set(xticks=[], yticks=[])
+            axis.set_title(f"{title}, {z_mm[plane]:g} mm", fontsize=7, pad=2)
+    figure.savefig(DOCS / "removal.jpg", dpi=110, pil_kwargs={"quality": 70})
+
+
+def _mixed(numbers: np.ndarray) -> np.ndarray:
+    """A colour for each number, black for 0."""
+    colours = np.random.default_rng(1).uniform(0.25, 1, size=(int(numbers.max()) + 1, 3))
+    colours[0] = 0
+    return colours[numbers]
+
+
+def draw_overview(data: pcii.Dataset, truth: pcii.Truth) -> None:
+    """From the photons of a view to depth."""
+    counts, z_mm, z_range_mm = data.counts, data.analysis["z_mm"], data.analysis["z_range_mm"]
     focus = pcii.segment(counts, z_mm)
-    depth = pcii.estimate_depth(counts, data.analysis["z_range_mm"])
+    depth = pcii.estimate_depth(counts, z_range_mm)
     score = pcii.score(focus, depth, truth)
     iou = {row["z_mm"]: row["iou"] for row in score.planes if row["truth"] == "object"}
     shown = light(focus.sections)
@@ -72,7 +112,7 @@ def main(dataset: Path) -> None:
         last.text(
             middle, 240, f"{z.min():.0f}–{z.max():.0f} mm", color=FAINT, fontsize=9, ha="center", va="bottom"
         )
-    figure.savefig(Path(__file__).with_name("overview.jpg"), dpi=130, pil_kwargs={"quality": 86})
+    figure.savefig(DOCS / "overview.jpg", dpi=130, pil_kwargs={"quality": 86})
 
 
 def light(sections: pcii.Sections) -> np.ndarray:
@@ -110,4 +150,8 @@ def title(axis: Axes, text: str) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    dataset = pcii.open_dataset(sys.argv[1])
+    if dataset.truth is None:
+        raise SystemExit(f"{sys.argv[1]}: has no truth")
+    draw_steps(dataset, dataset.truth)
+    draw_overview(dataset, dataset.truth)
