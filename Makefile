@@ -89,7 +89,7 @@ bench-publish: bench
 train: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[train]'
 	for recipe in training/recipes/*.toml; do \
-	  $(BIN)/simgen generate $$recipe --trust-python --out $(OUT)/training/$$(basename $$recipe .toml) || exit; \
+	  $(BIN)/simgen generate $$recipe --out $(OUT)/training/$$(basename $$recipe .toml) || exit; \
 	done
 	$(BIN)/python -m training.samples $(OUT)/training/* --out $(OUT)/training-examples
 	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES) \

@@ -4,10 +4,7 @@ examples     Batches of examples: parts of films, each with a request of its own
 export       Write trained weights as the files that `pcii` runs.
 fit          Train the network on examples.
 layers       The network in PyTorch.
-mesh_shapes  Curved shapes as meshes, for scenes.
-more_scenes  Further scenes: rooms, heaps, narrow, plain, leaning and glossy things.
 recipes      Datasets to make examples of, for `simgen generate`.
 requests     Which planes an example is asked for, and which object belongs to which of them.
 samples      Examples: inputs of the network for datasets, at random amounts of light, with the truth.
-scenes       Scenes that are for training alone.
 """
