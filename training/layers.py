@@ -9,15 +9,15 @@ there.
 """
 
 from itertools import pairwise
-from pathlib import Path
 
-import torch
-import torch.nn.functional as f
-from torch import Tensor, nn
+import torch  # pyright: ignore[reportMissingImports]
+import torch.nn.functional as f  # pyright: ignore[reportMissingImports]
+from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
 WIDTHS = (16, 32, 56, 80, 80)
 """Channels of cells of 4, 8, 16, 32 and 64 px."""
 HEAD = 8
+"""Channels of blocks."""
 STEPS = (1, -1, 4, -4)
 MOVED = 8
 """One channel in `MOVED` is exchanged by each of the steps."""
@@ -169,29 +169,8 @@ class SurfaceNetwork(nn.Module):
         super().__init__()
         self.trunk, self.head = Trunk(), Head()
 
-    def forward(
-        self,
-        evidence: Tensor,
-        brightness: Tensor,
-        coverage: Tensor,
-        surface: Tensor,
-        light: Tensor,
-        hint: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        *cells, nothing = self.trunk(evidence, brightness, coverage, surface, light, hint)
+    def forward(self, evidence: Tensor, brightness: Tensor, *others: Tensor) -> tuple[Tensor, Tensor]:
+        *cells, nothing = self.trunk(evidence, brightness, *others)
         logit, mask = self.head(*cells, evidence, brightness)
         nothing = f.interpolate(nothing, scale_factor=2.0, mode="nearest")
         return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1), mask
-
-    def load_exported(self, folder: Path) -> None:
-        """Take the weights of `trunk.onnx` and `head.onnx`; layers that these do not have stay as they
-        are."""
-        import onnx
-        from onnx import numpy_helper
-
-        for part, name in ((self.trunk, "trunk"), (self.head, "head")):
-            graph = onnx.load(folder / f"{name}.onnx").graph
-            own = part.state_dict()
-            weights = {one.name: numpy_helper.to_array(one) for one in graph.initializer if one.name in own}
-            state = {key: torch.from_numpy(values.copy()) for key, values in weights.items()}
-            part.load_state_dict(own | state)
