@@ -66,39 +66,34 @@ def glossy(random: Random) -> Table:
     return metal(random.choice(["Ag", "Al", "Au", "Cr", "Cu", "W"]), roughness)
 
 
-def placed(name: str, place_mm: Triple, rotation_deg: Triple, shape: Table, material: Table) -> Table:
-    """An object of a scene."""
-    return {
-        "name": name,
-        "position_mm": [round(value, 1) for value in place_mm],
-        "rotation_deg": [round(value, 1) for value in rotation_deg],
-        "shape": shape,
-        "material": material,
-    }
+class Objects(list[Table]):
+    """The objects of a scene."""
+
+    def add(self, name: str, place_mm: Triple, rotation_deg: Triple, shape: Table, material: Table) -> None:
+        """Put another one beside them."""
+        thing: Table = {"name": name, "shape": shape, "material": material}
+        thing["position_mm"] = [round(value, 1) for value in place_mm]
+        self.append(thing | {"rotation_deg": [round(value, 1) for value in rotation_deg]})
 
 
 def sphere(radius_mm: float) -> Table:
     """A sphere."""
-    return _shape("sphere", radius_mm=radius_mm)
+    return {"type": "sphere", "radius_mm": round(radius_mm, 1)}
 
 
 def cylinder_of(radius_mm: float, length_mm: float) -> Table:
     """A cylinder, whose axis is upright."""
-    return _shape("cylinder", radius_mm=radius_mm, length_mm=length_mm)
+    return {"type": "cylinder", "radius_mm": round(radius_mm, 1), "length_mm": round(length_mm, 1)}
 
 
 def box_of(width_mm: float, height_mm: float, depth_mm: float) -> Table:
     """A box."""
-    return _shape("box", width_mm=width_mm, height_mm=height_mm, depth_mm=depth_mm)
+    return card(width_mm, height_mm) | {"type": "box", "depth_mm": round(depth_mm, 1)}
 
 
 def card(width_mm: float, height_mm: float) -> Table:
     """A card, which faces the cameras."""
-    return _shape("card", width_mm=width_mm, height_mm=height_mm)
-
-
-def _shape(kind: str, **sizes_mm: float) -> Table:
-    return {"type": kind} | {name: round(size_mm, 1) for name, size_mm in sizes_mm.items()}
+    return {"type": "card", "width_mm": round(width_mm, 1), "height_mm": round(height_mm, 1)}
 
 
 def lamp_above(x_mm: float, z_mm: float, luminance_cd_m2: float) -> Table:
@@ -120,7 +115,7 @@ def sky(luminance_cd_m2: float) -> Table:
 
 def composed(
     title: str,
-    objects: list[Table],
+    objects: Objects,
     planes_mm: Sequence[float],
     lights: list[Table],
     backdrop: Table | None,

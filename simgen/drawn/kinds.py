@@ -13,6 +13,7 @@ from random import Random
 from simgen.drawn.composition import (
     UPRIGHT,
     Material,
+    Objects,
     Table,
     Triple,
     box_of,
@@ -25,7 +26,6 @@ from simgen.drawn.composition import (
     lamp_above,
     metal,
     noise,
-    placed,
     plain,
     sky,
     sphere,
@@ -75,7 +75,8 @@ def drawn_crossing(random: Random) -> Scene:
     x, y = random.uniform(-20, 20), random.uniform(-20, 20)
     radius, scale = random.uniform(50, 65), far / REFERENCE_MM
     place = x * scale, y * scale, far + 0.6 * radius * scale
-    objects = [solid(random, "behind", place, radius * scale, behind)]
+    objects = Objects()
+    add_solid(random, objects, "behind", place, radius * scale, behind)
     scale = near / REFERENCE_MM
     r, long = random.uniform(11, 17) * scale, random.uniform(170, 230) * scale
     # Each with how far its middle is behind what is seen of it.
@@ -84,7 +85,7 @@ def drawn_crossing(random: Random) -> Scene:
     )
     rotation_deg = random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(0, 180)
     place = (x + random.uniform(-25, 25)) * scale, (y + random.uniform(-25, 25)) * scale, near + depth
-    objects.append(placed("across", place, rotation_deg, shape, across))
+    objects.add("across", place, rotation_deg, shape, across)
     return drawn_scene(random, "Drawn: crossing", objects, planes)
 
 
@@ -99,11 +100,11 @@ def _side_by_side(
 ) -> Scene:
     """From left to right; the first of two or of three is at `first_mm`, up or down by at most `high_mm`."""
     planes = planes_apart(random, random.choice([2, 2, 3]))
-    objects, x = [], first_mm[len(planes) - 2]
+    objects, x = Objects(), first_mm[len(planes) - 2]
     for position, z in enumerate(random.sample(planes, len(planes))):
         scale, radius = z / REFERENCE_MM, random.uniform(*radius_mm)
         place = x * scale, random.uniform(-high_mm, high_mm) * scale, z + 0.6 * radius * scale
-        objects.append(solid(random, f"solid-{position}", place, radius * scale, material(random)))
+        add_solid(random, objects, f"solid-{position}", place, radius * scale, material(random))
         x += random.uniform(*apart_mm)
     return drawn_scene(random, f"Drawn: {kind}", objects, planes)
 
@@ -112,7 +113,7 @@ def drawn_cards(random: Random) -> Scene:
     """16 to 40 small cards at three depths, over and under one another."""
     planes = [470, 550, 650]
     colours = [colour(random, 0.3, 0.7) for _ in planes]
-    objects = []
+    objects = Objects()
     for position in range(random.randrange(16, 41)):
         layer = random.randrange(len(planes))
         z, scale = planes[layer], planes[layer] / REFERENCE_MM
@@ -124,24 +125,24 @@ def drawn_cards(random: Random) -> Scene:
         material = noise(random, own) if random.random() < 0.8 else plain(random)
         rotation_deg = random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(0, 180)
         place = x, y, z + random.uniform(-6, 6)
-        objects.append(placed(f"card-{position}", place, rotation_deg, shape, material))
+        objects.add(f"card-{position}", place, rotation_deg, shape, material)
     return drawn_scene(random, "Drawn: cards", objects, planes)
 
 
 def drawn_room(random: Random) -> Scene:
     """Two or three solids before a wall of detail, on a desk or not: the film is bright all over."""
     planes, wall = planes_apart(random, random.choice([2, 2, 3])), 760
-    objects = []
+    objects = Objects()
     for position, z in enumerate(planes):
         radius, scale = random.uniform(26, 42), z / REFERENCE_MM
         x, y = random.uniform(-90, 90) * scale, (30 - 0.2 * radius) * scale + random.uniform(-60, 0)
         place = x, y, z + 0.6 * radius * scale
-        objects.append(solid(random, f"solid-{position}", place, radius * scale, pattern(random)))
+        add_solid(random, objects, f"solid-{position}", place, radius * scale, pattern(random))
     detail = noise(random, colour(random, 0.3, 0.7))
-    objects.append(placed("wall", (0.0, 0.0, wall + 1.0), UPRIGHT, card(1000, 1000), detail))
+    objects.add("wall", (0.0, 0.0, wall + 1.0), UPRIGHT, card(1000, 1000), detail)
     if random.random() < 0.5:
         top = noise(random, colour(random, 0.3, 0.7))
-        objects.append(placed("desk", (0.0, 205.0, 595.0), UPRIGHT, box_of(800, 240, 320), top))
+        objects.add("desk", (0.0, 205.0, 595.0), UPRIGHT, box_of(800, 240, 320), top)
     return drawn_scene(random, "Drawn: room", objects, [*planes, wall], backdrop=None)
 
 
@@ -150,7 +151,8 @@ def drawn_leaves(random: Random) -> Scene:
     near, far = planes = two_planes(random)
     radius, scale = random.uniform(50, 70), far / REFERENCE_MM
     place = random.uniform(-20, 20) * scale, random.uniform(-20, 20) * scale, far + 0.6 * radius * scale
-    objects = [solid(random, "thing", place, radius * scale, pattern(random))]
+    objects = Objects()
+    add_solid(random, objects, "thing", place, radius * scale, pattern(random))
     green, scale = noise(random, colour(random, 0.3, 0.7)), near / REFERENCE_MM
     for position in range(random.randrange(24, 49)):
         long = random.uniform(14, 32) * scale
@@ -158,7 +160,7 @@ def drawn_leaves(random: Random) -> Scene:
         x, y = (random.uniform(-100, 100) * scale for _ in range(2))
         rotation_deg = random.uniform(-40, 40), random.uniform(-40, 40), random.uniform(0, 180)
         place = x, y, near + random.uniform(-12, 12)
-        objects.append(placed(f"leaf-{position}", place, rotation_deg, shape, green))
+        objects.add(f"leaf-{position}", place, rotation_deg, shape, green)
     return drawn_scene(random, "Drawn: leaves", objects, planes)
 
 
@@ -167,7 +169,7 @@ def drawn_solids(random: Random) -> Scene:
     near = random.randint(470, 490)
     middle = near + random.randint(75, 90)
     far = middle + random.randint(80, 100)
-    standing: list[Table] = []
+    standing = Objects()
     reaches: list[tuple[tuple[float, float], float]] = []
 
     def stand(
@@ -184,7 +186,7 @@ def drawn_solids(random: Random) -> Scene:
         reaches.append(((x, z_mm), radius_mm))
         rotation_deg = 0.0, random.uniform(-60, 60), 0.0
         place = x, DESK_TOP_MM - half_height_mm, z_mm
-        standing.append(placed(name, place, rotation_deg, shape, _material(random, name)))
+        standing.add(name, place, rotation_deg, shape, _material(random, name))
 
     radius = random.uniform(32, 46)
     stand("ball", sphere(radius), radius, radius, far + 25, 90)
@@ -198,10 +200,11 @@ def drawn_solids(random: Random) -> Scene:
         radius, depth = random.uniform(7, 12), random.choice([near, middle])
         stand(f"marble-{number + 1}", sphere(radius), radius, radius, depth + 12, 115)
     wood = random.choice([[0.62, 0.52, 0.4], [0.62, 0.52, 0.4], [0.35, 0.25, 0.18], [0.42, 0.44, 0.5]])
-    desk = placed("desk", (0.0, 185.0, 590.0), UPRIGHT, box_of(640, 240, 320), noise(random, wood))
-    paper = noise(random, colour(random, 0.5, 0.75))
-    wall = placed("wall", (0.0, 0.0, 761.0), UPRIGHT, card(700, 700), paper)
-    return drawn_scene(random, "Solids on a desk", [desk, wall, *standing], [near, middle, far, 760], None)
+    objects = Objects()
+    objects.add("desk", (0.0, 185.0, 590.0), UPRIGHT, box_of(640, 240, 320), noise(random, wood))
+    objects.add("wall", (0.0, 0.0, 761.0), UPRIGHT, card(700, 700), noise(random, colour(random, 0.5, 0.75)))
+    objects += standing
+    return drawn_scene(random, "Solids on a desk", objects, [near, middle, far, 760], None)
 
 
 def drawn_foliage(random: Random) -> Scene:
@@ -210,7 +213,7 @@ def drawn_foliage(random: Random) -> Scene:
     far = near + random.randint(95, 140)
     greens = [[0.3, 0.5, 0.2], [0.45, 0.55, 0.25], [0.6, 0.45, 0.2], [0.55, 0.25, 0.2]]
     (green,) = random.choices(greens, weights=[4, 3, 1, 1])
-    objects = []
+    objects = Objects()
     for number in range(random.randint(20, 45)):
         place = random.gauss(0, 33), random.gauss(0, 33), near + random.gauss(0, 2)
         rotation_deg = random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(0, 180)
@@ -218,12 +221,12 @@ def drawn_foliage(random: Random) -> Scene:
         # Each a little lighter or darker than the green of all.
         light = random.uniform(0.8, 1.25)
         material = noise(random, [round(min(light * part, 1.0), 3) for part in green])
-        objects.append(placed(f"leaf-{number + 1}", place, rotation_deg, shape, material))
+        objects.add(f"leaf-{number + 1}", place, rotation_deg, shape, material)
     ball, tin = sphere(random.uniform(58, 72)), cylinder_of(random.uniform(42, 54), random.uniform(110, 150))
     shape = random.choice([ball, tin, box_of(random.uniform(85, 110), random.uniform(95, 130), 60)])
     rotation_deg = random.uniform(-20, 20), random.uniform(-40, 40), random.uniform(-30, 30)
     place = random.uniform(-15, 15), random.uniform(-15, 15), far + 25.0
-    objects.append(placed("hidden", place, rotation_deg, shape, _material(random, "hidden")))
+    objects.add("hidden", place, rotation_deg, shape, _material(random, "hidden"))
     backdrop = {"z_mm": 2500.0, "reflectance": [0.03, 0.035, 0.04]}
     return drawn_scene(random, "Something behind leaves", objects, [near, far], backdrop)
 
@@ -254,7 +257,7 @@ def pattern(random: Random) -> Table:
 def drawn_scene(
     random: Random,
     title: str,
-    objects: list[Table],
+    objects: Objects,
     planes_mm: Sequence[int],
     backdrop: Table | None = DARK_BACKDROP,
 ) -> Scene:
@@ -278,9 +281,11 @@ def two_planes(random: Random) -> tuple[int, int]:
     return near, near + random.randrange(90, 141)
 
 
-def solid(random: Random, name: str, place_mm: Triple, radius_mm: float, material: Table) -> Table:
-    """A turned sphere, cylinder or box, about as large as a sphere of this radius."""
+def add_solid(
+    random: Random, objects: Objects, name: str, place_mm: Triple, radius_mm: float, material: Table
+) -> None:
+    """Add a turned sphere, cylinder or box, about as large as a sphere of this radius."""
     rotation_deg = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
     r = radius_mm
     shapes = [sphere(r), cylinder_of(0.7 * r, 2.1 * r), box_of(1.5 * r, 1.7 * r, 1.3 * r)]
-    return placed(name, place_mm, rotation_deg, random.choice(shapes), material)
+    objects.add(name, place_mm, rotation_deg, random.choice(shapes), material)

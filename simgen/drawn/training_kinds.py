@@ -7,12 +7,15 @@ and pixels of 0.0704 mm.
 """
 
 import math
+from functools import partial
 from itertools import accumulate
 from random import Random
 
+from simgen.drawn import curved_shapes as curved
+from simgen.drawn import training_parts as parts
 from simgen.drawn.composition import (
     UPRIGHT,
-    Table,
+    Objects,
     Triple,
     box_of,
     card,
@@ -22,26 +25,9 @@ from simgen.drawn.composition import (
     glossy,
     lamp_above,
     log_uniform,
-    placed,
     plain,
     sky,
     sphere,
-)
-from simgen.drawn.curved_shapes import blob, head, mesh_folder, mesh_of, spindle, tube
-from simgen.drawn.training_parts import (
-    HALF_FIELD,
-    any_backdrop,
-    any_lights,
-    any_material,
-    any_shape,
-    any_turn,
-    anything_behind,
-    large_material,
-    narrow_things,
-    nearly_alike,
-    pictures_on_wall,
-    wall_at,
-    walls,
 )
 from simgen.spec.scene import Scene
 
@@ -59,7 +45,7 @@ def assorted(random: Random) -> Scene:
     near = random.randint(455, 520)
     middle = near + random.randint(50, 90)
     far = middle + random.randint(50, 100)
-    objects: list[Table] = []
+    objects = Objects()
 
     def add(kind: str, sizes_mm: list[tuple[float, float]], behind_mm: float, turn_deg: Triple) -> None:
         """A thing whose sizes are between these, its middle so far behind a plane."""
@@ -71,7 +57,7 @@ def assorted(random: Random) -> Scene:
         make = {"ball": sphere, "box": box_of, "tin": cylinder_of, "card": card}[kind]
         shape = make(*(log_uniform(random, *ends) for ends in sizes_mm))
         count = sum(thing["name"].startswith(kind) for thing in objects)
-        objects.append(placed(f"{kind}-{count}", place, (a, b, c), shape, any_material(random)))
+        objects.add(f"{kind}-{count}", place, (a, b, c), shape, parts.any_material(random))
 
     for _ in range(random.randint(0, 3)):
         add("ball", [(10, 65)], 30, (180, 180, 180))
@@ -85,7 +71,7 @@ def assorted(random: Random) -> Scene:
         turned = random.choice([UPRIGHT, (random.uniform(-10, 10), random.uniform(-30, 30), 0.0)])
         turned = random.choice([turned, (random.uniform(40, 65), random.uniform(-10, 10), 0.0)])
         place = 0.0, 60.0, random.uniform(690, 780)
-        objects.append(placed("ground", place, turned, card(900, 900), any_material(random, 2048)))
+        objects.add("ground", place, turned, card(900, 900), parts.any_material(random, 2048))
     luminances = [log_uniform(random, 500, 4000), log_uniform(random, 40, 400)]
     return _under_a_lamp(random, "Assorted things", objects, [near, middle, far], luminances)
 
@@ -95,12 +81,16 @@ def screens(random: Random) -> Scene:
     sometimes a wall: from every camera another part of what is behind is hidden."""
     near = random.randint(450, 510)
     far = near + random.randint(60, 150)
-    width, tilt, material = log_uniform(random, 3, 16), random.uniform(-90, 90), any_material(random, 256)
-    objects = []
+    width, tilt, material = (
+        log_uniform(random, 3, 16),
+        random.uniform(-90, 90),
+        parts.any_material(random, 256),
+    )
+    objects = Objects()
     for number in range(random.choice([3, 6, 10])):
         place = random.uniform(-110, 110), random.uniform(-30, 30), near + random.gauss(0, 2)
         shape = card(width, random.uniform(120, 260))
-        objects.append(placed(f"bar-{number}", place, (0.0, 0.0, tilt + random.gauss(0, 6)), shape, material))
+        objects.add(f"bar-{number}", place, (0.0, 0.0, tilt + random.gauss(0, 6)), shape, material)
     for number in range(random.randint(1, 2)):
         ball = sphere(random.uniform(30, 72))
         tin = cylinder_of(random.uniform(25, 54), random.uniform(70, 150))
@@ -108,10 +98,10 @@ def screens(random: Random) -> Scene:
         shape = random.choice([ball, tin, box])
         place = random.uniform(-60, 60), random.uniform(-50, 50), far + 25.0
         turned = random.uniform(-20, 20), random.uniform(-40, 40), random.uniform(-30, 30)
-        objects.append(placed(f"thing-{number}", place, turned, shape, any_material(random)))
+        objects.add(f"thing-{number}", place, turned, shape, parts.any_material(random))
     if random.random() < 1 / 3:
-        place = 0.0, 0.0, random.uniform(690, 780)
-        objects.append(placed("wall", place, UPRIGHT, card(900, 900), any_material(random, 2048)))
+        material = partial(parts.any_material, pixels=2048)
+        parts.add_wall(random, objects, random.uniform(690, 780), material, side_mm=900)
     luminances = [2000, log_uniform(random, 60, 300)]
     return _under_a_lamp(random, "Things behind bars", objects, [near, far], luminances)
 
@@ -122,18 +112,20 @@ def furnished(random: Random) -> Scene:
     planes = plane_depths(random, random.choice([2, 2, 3]), nearest_gap_px=8)
     *planes, wall = planes if random.random() < 0.5 else [*planes, random.randint(planes[-1] + 40, 800)]
     floor = log_uniform(random, 60, 160)
-    objects = [*walls(random, wall, floor), *pictures_on_wall(random, wall, floor)]
+    objects = Objects()
+    parts.add_room(random, objects, wall, floor)
+    parts.add_pictures(random, objects, wall, floor)
     for number in range(random.randint(len(planes), 2 * len(planes) + 1)):
         z = planes[number % len(planes)]
-        shape, behind, half_height = any_shape(random, log_uniform(random, 12, 60))
-        x = random.uniform(-0.75, 0.75) * HALF_FIELD * z
+        shape, behind, half_height = parts.any_shape(random, log_uniform(random, 12, 60))
+        x = random.uniform(-0.75, 0.75) * parts.HALF_FIELD * z
         turned = 0.0, random.uniform(-50, 50), 0.0
         if stands := random.random() < 0.7:
             y = floor - half_height - 0.2
         else:
-            y = random.uniform(-0.7 * HALF_FIELD * z, floor - 1.5 * half_height)
+            y = random.uniform(-0.7 * parts.HALF_FIELD * z, floor - 1.5 * half_height)
         name = f"{'standing' if stands else 'hanging'}-{number}"
-        objects.append(placed(name, (x, y, z + behind), turned, shape, any_material(random)))
+        objects.add(name, (x, y, z + behind), turned, shape, parts.any_material(random))
     named = [*planes, wall] if random.random() < 0.5 else planes
     return _in_any_light(random, "A furnished room", objects, named)
 
@@ -141,59 +133,61 @@ def furnished(random: Random) -> Scene:
 def heap(random: Random) -> Scene:
     """Many things of one kind, of one to three materials, over and under one another."""
     planes = plane_depths(random, random.choice([1, 2, 2, 3]))
-    materials = [random.choice([plain, any_material])(random) for _ in range(random.choice([1, 1, 1, 2, 3]))]
+    materials = [
+        random.choice([plain, parts.any_material])(random) for _ in range(random.choice([1, 1, 1, 2, 3]))
+    ]
     size, spread = log_uniform(random, 7, 40), log_uniform(random, 30, 90)
     size_spread, depth_spread = random.uniform(0, 0.3), log_uniform(random, 0.5, 8)
     kind = random.choice(["ball", "box", "rod", "card"])
     turn = random.choice([5.0, 45.0])
-    objects = []
+    objects = Objects()
     for number in range(round(log_uniform(random, 8, 70))):
-        shape, behind, _ = any_shape(random, size * math.exp(random.gauss(0, size_spread)), kind)
+        shape, behind, _ = parts.any_shape(random, size * math.exp(random.gauss(0, size_spread)), kind)
         z = random.choice(planes) + behind + random.gauss(0, depth_spread)
         place = random.gauss(0, spread), random.gauss(0, 0.8 * spread), z
         turned = random.uniform(-turn, turn), random.uniform(-turn, turn), random.uniform(-180, 180)
-        material = nearly_alike(random, random.choice(materials))
-        objects.append(placed(f"{kind}-{number}", place, turned, shape, material))
-    objects += anything_behind(random, planes[-1])
+        material = parts.nearly_alike(random, random.choice(materials))
+        objects.add(f"{kind}-{number}", place, turned, shape, material)
+    parts.add_backwall(random, objects, planes[-1])
     return _in_any_light(random, "A heap", objects, planes)
 
 
 def pickets(random: Random) -> Scene:
     """Pickets, rods, a grid or wires, 3 to 25 px wide, before one to three things or a wall."""
     near, *others = plane_depths(random, random.choice([2, 2, 3]))
-    objects = narrow_things(random, near)
-    material = random.choice([plain, any_material])
+    objects = Objects()
+    parts.add_narrow_things(random, objects, near)
+    material = random.choice([plain, parts.any_material])
     if random.random() < 0.3:
-        wall = card(1000, 1000)
-        objects.append(placed("wall", (0.0, 0.0, others[-1]), UPRIGHT, wall, material(random)))
+        parts.add_wall(random, objects, others[-1], material, side_mm=1000)
         others = others[:-1] or others
     for number in range(random.randint(1, 3)):
         z = random.choice(others)
-        shape, behind, _ = any_shape(random, log_uniform(random, 25, 90))
+        shape, behind, _ = parts.any_shape(random, log_uniform(random, 25, 90))
         place = random.uniform(-100, 100), random.uniform(-80, 80), z + behind - 1.0
-        objects.append(placed(f"thing-{number}", place, any_turn(random), shape, material(random)))
-    objects += anything_behind(random, max(others))
+        objects.add(f"thing-{number}", place, parts.any_turn(random), shape, material(random))
+    parts.add_backwall(random, objects, max(others))
     return _in_any_light(random, "Narrow things", objects, [near, *others])
 
 
 def plain_pair(random: Random) -> Scene:
     """Two or three large things of one colour each before the dark, or before what is plain as well."""
     planes = plane_depths(random, random.choice([2, 2, 3]))
-    apart, objects = log_uniform(random, 50, 130), []
+    apart, objects = log_uniform(random, 50, 130), Objects()
     for number, z in enumerate(random.sample(planes, len(planes))):
-        shape, behind, _ = any_shape(random, log_uniform(random, 38, 95))
+        shape, behind, _ = parts.any_shape(random, log_uniform(random, 38, 95))
         x = apart * (number - (len(planes) - 1) / 2) + random.uniform(-15, 15)
         place = x, random.uniform(-40, 40), z + behind
-        objects.append(placed(f"plain-{number}", place, any_turn(random), shape, plain(random)))
+        objects.add(f"plain-{number}", place, parts.any_turn(random), shape, plain(random))
     if random.random() < 0.3:
-        objects.append(wall_at(random, random.uniform(planes[-1] + 60, 850), plain))
+        parts.add_wall(random, objects, random.uniform(planes[-1] + 60, 850), plain)
     return _in_any_light(random, "Large plain things", objects, planes)
 
 
 def leaning(random: Random) -> Scene:
     """Cards, books and floors that lean through depth, some with things that do not among them."""
     planes = plane_depths(random, random.choice([1, 2, 3]))
-    objects = []
+    objects = Objects()
     for number in range(random.randint(1, 4)):
         long, broad = log_uniform(random, 80, 400), log_uniform(random, 40, 200)
         angle = random.choice([-1, 1]) * random.uniform(25, 75)
@@ -203,17 +197,17 @@ def leaning(random: Random) -> Scene:
         turned = *turned, random.choice([0.0, random.uniform(-30, 30)])
         place = random.uniform(-90, 90), random.uniform(-80, 80), random.choice(planes)
         shape = random.choice([card(*size), box_of(*size, log_uniform(random, 3, 30))])
-        objects.append(placed(f"leaning-{number}", place, turned, shape, any_material(random)))
+        objects.add(f"leaning-{number}", place, turned, shape, parts.any_material(random))
     for number in range(random.randint(0, 3)):
         z = random.choice(planes)
-        shape, behind, _ = any_shape(random, log_uniform(random, 12, 50))
+        shape, behind, _ = parts.any_shape(random, log_uniform(random, 12, 50))
         place = random.uniform(-110, 110), random.uniform(-90, 90), z + behind
-        objects.append(placed(f"thing-{number}", place, any_turn(random), shape, any_material(random)))
+        objects.add(f"thing-{number}", place, parts.any_turn(random), shape, parts.any_material(random))
     if random.random() < 0.4:
         place = 0.0, random.uniform(90, 160), random.uniform(560, 640)
         turned = random.uniform(-90, -70), random.uniform(-15, 15), 0.0
-        objects.append(placed("floor", place, turned, card(900, 420), large_material(random)))
-    objects += anything_behind(random, 760)
+        objects.add("floor", place, turned, card(900, 420), parts.large_material(random))
+    parts.add_backwall(random, objects, 760)
     return _in_any_light(random, "Leaning things", objects, planes)
 
 
@@ -221,34 +215,37 @@ def glazed(random: Random) -> Scene:
     """Things of glass, metal and shiny plastic, and some that are matt, before a wall or in a room."""
     planes = plane_depths(random, random.choice([2, 3]))
     wall, has_glass = random.uniform(planes[-1] + 50, 850), random.random() < 0.5
-    objects = [wall_at(random, wall, large_material)]
+    objects = Objects()
+    parts.add_wall(random, objects, wall, parts.large_material)
     if not has_glass and random.random() < 0.5:
-        objects = walls(random, wall, random.uniform(90, 160))
+        objects.clear()
+        parts.add_room(random, objects, wall, random.uniform(90, 160))
     for number in range(random.randint(2, 6)):
         z = planes[number % len(planes)]
-        shape, behind, _ = any_shape(random, log_uniform(random, 15, 65))
+        shape, behind, _ = parts.any_shape(random, log_uniform(random, 15, 65))
         place = random.uniform(-110, 110), random.uniform(-80, 70), z + behind
-        material = random.choice([glossy, glossy, any_material])(random)
+        material = random.choice([glossy, glossy, parts.any_material])(random)
         if has_glass and number < 2:
             material = {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
-        objects.append(placed(f"glazed-{number}", place, any_turn(random), shape, material))
+        objects.add(f"glazed-{number}", place, parts.any_turn(random), shape, material)
     return _in_any_light(random, "Glass and gloss", objects, planes)
 
 
 def meshes(random: Random) -> Scene:
     """Two to six curved shapes: blobs, heads, rings, knots, springs, cones, capsules and vases."""
     planes = plane_depths(random, random.choice([2, 2, 3, 4]))
-    objects = []
+    objects = Objects()
     for number in range(random.randint(2, 6)):
-        make, z = random.choice([blob, head, tube, tube, spindle]), planes[number % len(planes)]
+        make = random.choice([curved.blob, curved.head, curved.tube, curved.tube, curved.spindle])
         size = log_uniform(random, 18, 85)
-        place = random.uniform(-100, 100), random.uniform(-80, 80), z + (0.0 if make is tube else 0.6 * size)
-        turn = 40.0 if make is head else random.choice([25.0, 180.0])
+        z = planes[number % len(planes)] + (0.0 if make is curved.tube else 0.6 * size)
+        place = random.uniform(-100, 100), random.uniform(-80, 80), z
+        turn = 40.0 if make is curved.head else random.choice([25.0, 180.0])
         rotation = random.uniform(-turn, turn) / 2, random.uniform(-turn, turn), random.uniform(-turn, turn)
-        material = random.choice([plain, any_material, any_material, glossy])(random)
-        name, shape = f"{make.__name__}-{number}", mesh_of(make(random), size)
-        objects.append(placed(name, place, rotation, shape, material))
-    objects += anything_behind(random, planes[-1])
+        material = random.choice([plain, parts.any_material, parts.any_material, glossy])(random)
+        name, shape = f"{make.__name__}-{number}", curved.mesh_of(make(random), size)
+        objects.add(name, place, rotation, shape, material)
+    parts.add_backwall(random, objects, planes[-1])
     return _in_any_light(random, "Curved things", objects, planes)
 
 
@@ -256,8 +253,9 @@ def empty_wall(random: Random) -> Scene:
     """A bare or patterned wall by itself, upright or a little turned; the named planes are away from it."""
     wall = random.uniform(440, 760)
     turned = random.choice([UPRIGHT, (random.uniform(-8, 8), random.uniform(-12, 12), 0.0)])
-    material = random.choice([plain, large_material])(random)
-    objects = [placed("wall", (0.0, 0.0, wall), turned, card(1200, 1200), material)]
+    material = random.choice([plain, parts.large_material])(random)
+    objects = Objects()
+    objects.add("wall", (0.0, 0.0, wall), turned, card(1200, 1200), material)
     away = [plane for plane in range(440, 761) if abs(TOTAL_PX_MM / plane - TOTAL_PX_MM / wall) > 13]
     return _in_any_light(random, "An empty wall", objects, [random.choice(away)])
 
@@ -274,17 +272,18 @@ def plane_depths(random: Random, count: int, nearest_gap_px: float = GAP_PX[0]) 
 
 
 def _under_a_lamp(
-    random: Random, title: str, objects: list[Table], planes_mm: list[int], luminances_cd_m2: list[float]
+    random: Random, title: str, objects: Objects, planes_mm: list[int], luminances_cd_m2: list[float]
 ) -> Scene:
     """The scene of these objects, with the luminances of a lamp and of the sky."""
     x, z = round(random.uniform(-300, 300)), round(random.uniform(100, 400))
     lamp, around = (round(value, 1) for value in luminances_cd_m2)
     lights = [lamp_above(x, z, lamp), sky(around)]
-    return composed(title, objects, planes_mm, lights, any_backdrop(random, colour(random, 0.1, 0.6)))
+    return composed(title, objects, planes_mm, lights, parts.any_backdrop(random, colour(random, 0.1, 0.6)))
 
 
-def _in_any_light(random: Random, title: str, objects: list[Table], planes_mm: list[int]) -> Scene:
+def _in_any_light(random: Random, title: str, objects: Objects, planes_mm: list[int]) -> Scene:
     finishes = {thing["material"]["finish"]["type"] for thing in objects if "finish" in thing["material"]}
     bright = colour(random, 0.1, 0.6)
-    lights = any_lights(random, finishes)
-    return composed(title, objects, planes_mm, lights, any_backdrop(random, bright), mesh_folder())
+    lights = parts.any_lights(random, finishes)
+    backdrop = parts.any_backdrop(random, bright)
+    return composed(title, objects, planes_mm, lights, backdrop, curved.mesh_folder())

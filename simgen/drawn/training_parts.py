@@ -6,6 +6,7 @@ from random import Random
 from simgen.drawn.composition import (
     UPRIGHT,
     Material,
+    Objects,
     Table,
     Triple,
     box_of,
@@ -14,7 +15,6 @@ from simgen.drawn.composition import (
     cylinder_of,
     log_uniform,
     metal,
-    placed,
     plain,
     sky,
     sphere,
@@ -104,35 +104,39 @@ def large_material(random: Random) -> Table:
     return {"texture": shades}
 
 
-def wall_at(random: Random, z_mm: float, material: Material, name: str = "wall") -> Table:
-    """A wall that fills the film."""
-    return placed(name, (0.0, 0.0, z_mm), UPRIGHT, card(1200, 1200), material(random))
+def add_wall(
+    random: Random,
+    objects: Objects,
+    z_mm: float,
+    material: Material,
+    name: str = "wall",
+    side_mm: float = 1200,
+) -> None:
+    """Add an upright wall that fills the film."""
+    objects.add(name, (0.0, 0.0, z_mm), UPRIGHT, card(side_mm, side_mm), material(random))
 
 
-def anything_behind(random: Random, farthest_mm: float) -> list[Table]:
-    """As often as not, a wall behind all."""
-    if random.random() < 0.5:
-        return []
-    return [wall_at(random, random.uniform(farthest_mm + 40, 880), large_material, "backwall")]
+def add_backwall(random: Random, objects: Objects, farthest_mm: float) -> None:
+    """As often as not, add a wall behind all."""
+    if random.random() >= 0.5:
+        add_wall(random, objects, random.uniform(farthest_mm + 40, 880), large_material, "backwall")
 
 
-def walls(random: Random, wall_mm: float, floor_mm: float) -> list[Table]:
-    """A back wall, mostly a floor and often a side wall or two."""
-    objects = [wall_at(random, wall_mm, large_material)]
+def add_room(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
+    """Add a back wall, mostly a floor and often a side wall or two."""
+    add_wall(random, objects, wall_mm, large_material)
     middle, long = (wall_mm + 400) / 2, wall_mm - 400
     if random.random() < 0.8:
         place, shape = (0.0, floor_mm + 200, middle), box_of(1200, 400, long)
-        objects.append(placed("floor", place, UPRIGHT, shape, large_material(random)))
+        objects.add("floor", place, UPRIGHT, shape, large_material(random))
     for name, side in (("left", -1), ("right", 1)):
         if random.random() < 0.5:
-            place, turned = (side * random.uniform(150, 270), 0.0, middle), (0.0, 90.0, 0.0)
-            objects.append(placed(f"{name}-wall", place, turned, card(long, 1000), large_material(random)))
-    return objects
+            place = side * random.uniform(150, 270), 0.0, middle
+            objects.add(f"{name}-wall", place, (0.0, 90.0, 0.0), card(long, 1000), large_material(random))
 
 
-def pictures_on_wall(random: Random, wall_mm: float, floor_mm: float) -> list[Table]:
-    """Up to four pictures on the back wall, some of them in a frame, some of a few patches."""
-    objects = []
+def add_pictures(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
+    """Add up to four pictures on the back wall, some of them in a frame, some of a few patches."""
     for number in range(random.choice([0, 1, 1, 2, 3, 4])):
         width, height = log_uniform(random, 30, 250), log_uniform(random, 30, 180)
         reach = HALF_FIELD * wall_mm
@@ -140,19 +144,18 @@ def pictures_on_wall(random: Random, wall_mm: float, floor_mm: float) -> list[Ta
         turned = 0.0, 0.0, random.choice([0.0, random.uniform(-8, 8)])
         if random.random() < 0.5:
             frame = box_of(1.12 * width, 1.12 * height, 3)
-            objects.append(placed(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, plain(random)))
-        picture = card(width, height), any_material(random)
-        objects.append(placed(f"picture-{number}", (x, y, wall_mm - 3.3), turned, *picture))
+            objects.add(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, plain(random))
+        place, shape = (x, y, wall_mm - 3.3), card(width, height)
+        objects.add(f"picture-{number}", place, turned, shape, any_material(random))
         for patch in range(random.choice([0, 0, 3])):
             place = x + random.uniform(-0.3, 0.3) * width, y + random.uniform(-0.3, 0.3) * height
             shape = card(random.uniform(0.1, 0.4) * width, random.uniform(0.1, 0.4) * height)
             name, z = f"picture-{number}-{patch}", wall_mm - 3.6 - 0.3 * patch
-            objects.append(placed(name, (*place, z), turned, shape, any_material(random, 128)))
-    return objects
+            objects.add(name, (*place, z), turned, shape, any_material(random, 128))
 
 
-def narrow_things(random: Random, z_mm: float) -> list[Table]:
-    """Pickets, rods or wires beside each other, or two layers of them across each other, of one material."""
+def add_narrow_things(random: Random, objects: Objects, z_mm: float) -> None:
+    """Add pickets, rods or wires beside each other, of one material, or two layers of them that cross."""
     width = log_uniform(random, 2.4, 20)
     shape_of = random.choice(
         [
@@ -164,7 +167,6 @@ def narrow_things(random: Random, z_mm: float) -> list[Table]:
     spacing, tilt = width * log_uniform(random, 1.5, 6), random.uniform(-90, 90)
     count, disorder = max(3, min(24, round(320 / spacing))), random.choice([0.0, 1.0, 12.0])
     material = plain(random) if random.choice([True, False]) else any_material(random, 256)
-    objects = []
     for layer in range(random.choice([1, 1, 2])):
         long = random.uniform(100, 400)
         for number in range(count):
@@ -174,8 +176,7 @@ def narrow_things(random: Random, z_mm: float) -> list[Table]:
             cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
             place = along * cosine - across * sine, along * sine + across * cosine, z_mm + 2.0 * layer
             turned = 0.0, 0.0, angle + random.gauss(0, disorder)
-            objects.append(placed(f"narrow-{layer}-{number}", place, turned, shape_of(long), material))
-    return objects
+            objects.add(f"narrow-{layer}-{number}", place, turned, shape_of(long), material)
 
 
 def any_backdrop(random: Random, bright: list[float]) -> Table:
