@@ -10,26 +10,8 @@ from functools import partial
 from itertools import pairwise
 from random import Random
 
-from simgen.drawn.composition import (
-    UPRIGHT,
-    Material,
-    Objects,
-    Table,
-    Triple,
-    box_of,
-    card,
-    chessboard,
-    colour,
-    composed,
-    cylinder_of,
-    glossy,
-    lamp_above,
-    metal,
-    noise,
-    plain,
-    sky,
-    sphere,
-)
+from simgen.drawn import composition as draw
+from simgen.drawn.composition import UPRIGHT, Material, Objects, Table, Triple
 from simgen.spec.scene import Scene
 
 FIRST_UNSEEN = 100
@@ -38,7 +20,7 @@ REFERENCE_MM = 560.0
 """Sizes and places are drawn for this depth and scaled, so that things are as large in the picture."""
 PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
 MIN_DEPTH_GAP_MM = 80
-DARK_BACKDROP = {"z_mm": 3000.0, "reflectance": "black 2"}
+DARK = {"z_mm": 3000.0, "reflectance": "black 2"}
 DESK_TOP_MM = 65.0
 MIN_GAP_MM = 2.0
 MAX_TRIES = 1000
@@ -46,7 +28,7 @@ MAX_TRIES = 1000
 
 def drawn_plain(random: Random) -> Scene:
     """Two or three solids of one colour each, one before the border of another."""
-    return _side_by_side(random, "plain", plain)
+    return _side_by_side(random, "plain", draw.plain)
 
 
 def drawn_textured(random: Random) -> Scene:
@@ -57,13 +39,13 @@ def drawn_textured(random: Random) -> Scene:
 def drawn_checks(random: Random) -> Scene:
     """Two or three solids of coarse checks, one before the middle of the other."""
     # Close together, so that borders run through the middle of what is behind.
-    coarse = partial(chessboard, fewest=2, most=5)
+    coarse = partial(draw.chessboard, fewest=2, most=5)
     return _side_by_side(random, "checks", coarse, (-30, -45), (30, 60), (40, 60), 30)
 
 
 def drawn_shiny(random: Random) -> Scene:
     """Two or three solids of plastic or metal, glossy or dull, each by itself."""
-    return _side_by_side(random, "shiny", glossy, (-60, -105), (95, 115), (30, 48), 60)
+    return _side_by_side(random, "shiny", draw.glossy, (-60, -105), (95, 115), (30, 48), 60)
 
 
 def drawn_crossing(random: Random) -> Scene:
@@ -80,9 +62,8 @@ def drawn_crossing(random: Random) -> Scene:
     scale = near / REFERENCE_MM
     r, long = random.uniform(11, 17) * scale, random.uniform(170, 230) * scale
     # Each with how far its middle is behind what is seen of it.
-    shape, depth = random.choice(
-        [(cylinder_of(r, long), 0.6 * r), (box_of(2 * r, long, 8), 4.0), (sphere(2.4 * r), 1.4 * r)]
-    )
+    tin, box = draw.cylinder_of(r, long), draw.box_of(2 * r, long, 8)
+    shape, depth = random.choice([(tin, 0.6 * r), (box, 4.0), (draw.sphere(2.4 * r), 1.4 * r)])
     rotation_deg = random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(0, 180)
     place = (x + random.uniform(-25, 25)) * scale, (y + random.uniform(-25, 25)) * scale, near + depth
     objects.add("across", place, rotation_deg, shape, across)
@@ -112,17 +93,17 @@ def _side_by_side(
 def drawn_cards(random: Random) -> Scene:
     """16 to 40 small cards at three depths, over and under one another."""
     planes = [470, 550, 650]
-    colours = [colour(random, 0.3, 0.7) for _ in planes]
+    colours = [draw.colour(random, 0.3, 0.7) for _ in planes]
     objects = Objects()
     for position in range(random.randrange(16, 41)):
         layer = random.randrange(len(planes))
         z, scale = planes[layer], planes[layer] / REFERENCE_MM
         height = random.uniform(12, 40) * scale
-        shape = card(height * random.uniform(1, 2.2), height)
+        shape = draw.card(height * random.uniform(1, 2.2), height)
         x, y = (random.uniform(-120, 120) * scale for _ in range(2))
         # Most are of their layer's colour; some of any, some plain.
-        own = colours[layer] if random.random() < 0.6 else colour(random, 0.3, 0.7)
-        material = noise(random, own) if random.random() < 0.8 else plain(random)
+        own = colours[layer] if random.random() < 0.6 else draw.colour(random, 0.3, 0.7)
+        material = draw.noise(random, own) if random.random() < 0.8 else draw.plain(random)
         rotation_deg = random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(0, 180)
         place = x, y, z + random.uniform(-6, 6)
         objects.add(f"card-{position}", place, rotation_deg, shape, material)
@@ -138,11 +119,11 @@ def drawn_room(random: Random) -> Scene:
         x, y = random.uniform(-90, 90) * scale, (30 - 0.2 * radius) * scale + random.uniform(-60, 0)
         place = x, y, z + 0.6 * radius * scale
         add_solid(random, objects, f"solid-{position}", place, radius * scale, pattern(random))
-    detail = noise(random, colour(random, 0.3, 0.7))
-    objects.add("wall", (0.0, 0.0, wall + 1.0), UPRIGHT, card(1000, 1000), detail)
+    detail = draw.noise(random, draw.colour(random, 0.3, 0.7))
+    objects.add("wall", (0.0, 0.0, wall + 1.0), UPRIGHT, draw.card(1000, 1000), detail)
     if random.random() < 0.5:
-        top = noise(random, colour(random, 0.3, 0.7))
-        objects.add("desk", (0.0, 205.0, 595.0), UPRIGHT, box_of(800, 240, 320), top)
+        top = draw.noise(random, draw.colour(random, 0.3, 0.7))
+        objects.add("desk", (0.0, 205.0, 595.0), UPRIGHT, draw.box_of(800, 240, 320), top)
     return drawn_scene(random, "Drawn: room", objects, [*planes, wall], backdrop=None)
 
 
@@ -153,10 +134,10 @@ def drawn_leaves(random: Random) -> Scene:
     place = random.uniform(-20, 20) * scale, random.uniform(-20, 20) * scale, far + 0.6 * radius * scale
     objects = Objects()
     add_solid(random, objects, "thing", place, radius * scale, pattern(random))
-    green, scale = noise(random, colour(random, 0.3, 0.7)), near / REFERENCE_MM
+    green, scale = draw.noise(random, draw.colour(random, 0.3, 0.7)), near / REFERENCE_MM
     for position in range(random.randrange(24, 49)):
         long = random.uniform(14, 32) * scale
-        shape = card(long, long * random.uniform(0.4, 0.8))
+        shape = draw.card(long, long * random.uniform(0.4, 0.8))
         x, y = (random.uniform(-100, 100) * scale for _ in range(2))
         rotation_deg = random.uniform(-40, 40), random.uniform(-40, 40), random.uniform(0, 180)
         place = x, y, near + random.uniform(-12, 12)
@@ -172,10 +153,8 @@ def drawn_solids(random: Random) -> Scene:
     standing = Objects()
     reaches: list[tuple[tuple[float, float], float]] = []
 
-    def stand(
-        name: str, shape: Table, half_height_mm: float, radius_mm: float, z_mm: float, x_mm: float
-    ) -> None:
-        """Put something on the desk, drawn again until it is apart from all others."""
+    def stand(name: str, shape: Table, half_mm: float, radius_mm: float, z_mm: float, x_mm: float) -> None:
+        """Put something of this half height on the desk, drawn again until it is apart from all others."""
         for _ in range(MAX_TRIES):
             x = random.uniform(-x_mm, x_mm)
             gaps = (math.dist((x, z_mm), place) - reach - radius_mm for place, reach in reaches)
@@ -184,25 +163,25 @@ def drawn_solids(random: Random) -> Scene:
         else:
             return  # the desk is full
         reaches.append(((x, z_mm), radius_mm))
-        rotation_deg = 0.0, random.uniform(-60, 60), 0.0
-        place = x, DESK_TOP_MM - half_height_mm, z_mm
-        standing.add(name, place, rotation_deg, shape, _material(random, name))
+        place, turned = (x, DESK_TOP_MM - half_mm, z_mm), (0.0, random.uniform(-60, 60), 0.0)
+        standing.add(name, place, turned, shape, _material(random, name))
 
     radius = random.uniform(32, 46)
-    stand("ball", sphere(radius), radius, radius, far + 25, 90)
+    stand("ball", draw.sphere(radius), radius, radius, far + 25, 90)
     radius, height = random.uniform(20, 32), random.uniform(40, 75)
-    stand("tin", cylinder_of(radius, height), height / 2, radius, middle + 20, 95)
+    stand("tin", draw.cylinder_of(radius, height), height / 2, radius, middle + 20, 95)
     for number in range(random.randint(1, 2)):
         width, height, depth = random.uniform(28, 42), random.uniform(28, 50), random.uniform(28, 38)
         reach = math.hypot(width, depth) / 2
-        stand(f"block-{number + 1}", box_of(width, height, depth), height / 2, reach, near + 20, 110)
+        stand(f"block-{number + 1}", draw.box_of(width, height, depth), height / 2, reach, near + 20, 110)
     for number in range(random.randint(0, 4)):
         radius, depth = random.uniform(7, 12), random.choice([near, middle])
-        stand(f"marble-{number + 1}", sphere(radius), radius, radius, depth + 12, 115)
+        stand(f"marble-{number + 1}", draw.sphere(radius), radius, radius, depth + 12, 115)
     wood = random.choice([[0.62, 0.52, 0.4], [0.62, 0.52, 0.4], [0.35, 0.25, 0.18], [0.42, 0.44, 0.5]])
     objects = Objects()
-    objects.add("desk", (0.0, 185.0, 590.0), UPRIGHT, box_of(640, 240, 320), noise(random, wood))
-    objects.add("wall", (0.0, 0.0, 761.0), UPRIGHT, card(700, 700), noise(random, colour(random, 0.5, 0.75)))
+    objects.add("desk", (0.0, 185.0, 590.0), UPRIGHT, draw.box_of(640, 240, 320), draw.noise(random, wood))
+    paper = draw.noise(random, draw.colour(random, 0.5, 0.75))
+    objects.add("wall", (0.0, 0.0, 761.0), UPRIGHT, draw.card(700, 700), paper)
     objects += standing
     return drawn_scene(random, "Solids on a desk", objects, [near, middle, far, 760], None)
 
@@ -217,13 +196,14 @@ def drawn_foliage(random: Random) -> Scene:
     for number in range(random.randint(20, 45)):
         place = random.gauss(0, 33), random.gauss(0, 33), near + random.gauss(0, 2)
         rotation_deg = random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(0, 180)
-        shape = card(random.uniform(12, 28), random.uniform(8, 16))
+        shape = draw.card(random.uniform(12, 28), random.uniform(8, 16))
         # Each a little lighter or darker than the green of all.
         light = random.uniform(0.8, 1.25)
-        material = noise(random, [round(min(light * part, 1.0), 3) for part in green])
+        material = draw.noise(random, [round(min(light * part, 1.0), 3) for part in green])
         objects.add(f"leaf-{number + 1}", place, rotation_deg, shape, material)
-    ball, tin = sphere(random.uniform(58, 72)), cylinder_of(random.uniform(42, 54), random.uniform(110, 150))
-    shape = random.choice([ball, tin, box_of(random.uniform(85, 110), random.uniform(95, 130), 60)])
+    ball = draw.sphere(random.uniform(58, 72))
+    tin = draw.cylinder_of(random.uniform(42, 54), random.uniform(110, 150))
+    shape = random.choice([ball, tin, draw.box_of(random.uniform(85, 110), random.uniform(95, 130), 60)])
     rotation_deg = random.uniform(-20, 20), random.uniform(-40, 40), random.uniform(-30, 30)
     place = random.uniform(-15, 15), random.uniform(-15, 15), far + 25.0
     objects.add("hidden", place, rotation_deg, shape, _material(random, "hidden"))
@@ -235,36 +215,32 @@ def _material(random: Random, name: str) -> Table:
     """Metal or plastic for marbles, checks for blocks, checks, noise or stripes for the rest."""
     kind = name.partition("-")[0]
     if kind == "marble" and random.random() < 0.5:
-        return metal(random.choice(["Ag", "Au", "Cu"]), random.uniform(0.05, 0.4))
+        return draw.metal(random.choice(["Ag", "Au", "Cu"]), random.uniform(0.05, 0.4))
     if kind == "marble":
-        return {"reflectance": colour(random, 0.2, 0.9), "finish": {"type": "plastic", "roughness": 0.1}}
+        return {"reflectance": draw.colour(random, 0.2, 0.9), "finish": {"type": "plastic", "roughness": 0.1}}
     if kind == "block" or random.random() < 0.4:
-        return chessboard(random)
+        return draw.chessboard(random)
     if random.random() < 0.5:
-        return noise(random, colour(random, 0.3, 0.6))
+        return draw.noise(random, draw.colour(random, 0.3, 0.6))
     periods, angle = random.randint(6, 16), round(random.uniform(-90, 90), 1)
-    colours = [colour(random, 0.1, 0.6), [0.9, 0.88, 0.8]]
+    colours = [draw.colour(random, 0.1, 0.6), [0.9, 0.88, 0.8]]
     return {"texture": {"type": "stripes", "periods": periods, "angle_deg": angle, "colours": colours}}
 
 
 def pattern(random: Random) -> Table:
     """Noise or checks."""
     if random.random() < 0.6:
-        return noise(random, colour(random, 0.3, 0.7))
-    return chessboard(random)
+        return draw.noise(random, draw.colour(random, 0.3, 0.7))
+    return draw.chessboard(random)
 
 
 def drawn_scene(
-    random: Random,
-    title: str,
-    objects: Objects,
-    planes_mm: Sequence[int],
-    backdrop: Table | None = DARK_BACKDROP,
+    random: Random, title: str, objects: Objects, planes_mm: Sequence[int], backdrop: Table | None = DARK
 ) -> Scene:
     """The scene of these objects, its lamps drawn last."""
     x, z = round(random.uniform(-300, 300), 0), round(random.uniform(150, 400), 0)
-    lights = [lamp_above(x, z, 2000), sky(round(random.uniform(60, 150)))]
-    return composed(title, objects, planes_mm, lights, backdrop)
+    lights = [draw.lamp_above(x, z, 2000), draw.sky(round(random.uniform(60, 150)))]
+    return draw.composed(title, objects, planes_mm, lights, backdrop)
 
 
 def planes_apart(random: Random, count: int) -> list[int]:
@@ -284,8 +260,8 @@ def two_planes(random: Random) -> tuple[int, int]:
 def add_solid(
     random: Random, objects: Objects, name: str, place_mm: Triple, radius_mm: float, material: Table
 ) -> None:
-    """Add a turned sphere, cylinder or box, about as large as a sphere of this radius."""
+    """Add a turned draw.sphere, cylinder or box, about as large as a sphere of this radius."""
     rotation_deg = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
     r = radius_mm
-    shapes = [sphere(r), cylinder_of(0.7 * r, 2.1 * r), box_of(1.5 * r, 1.7 * r, 1.3 * r)]
+    shapes = [draw.sphere(r), draw.cylinder_of(0.7 * r, 2.1 * r), draw.box_of(1.5 * r, 1.7 * r, 1.3 * r)]
     objects.add(name, place_mm, rotation_deg, random.choice(shapes), material)

@@ -3,22 +3,8 @@
 import math
 from random import Random
 
-from simgen.drawn.composition import (
-    UPRIGHT,
-    Material,
-    Objects,
-    Table,
-    Triple,
-    box_of,
-    card,
-    colour,
-    cylinder_of,
-    log_uniform,
-    metal,
-    plain,
-    sky,
-    sphere,
-)
+from simgen.drawn import composition as draw
+from simgen.drawn.composition import UPRIGHT, Material, Objects, Table, Triple
 from simgen.drawn.curved_shapes import mesh_of, rod
 
 HALF_FIELD = 0.36
@@ -31,17 +17,17 @@ def any_shape(random: Random, size_mm: float, kind: str | None = None) -> tuple[
     r, stretch = size_mm, math.exp(random.gauss(0, 0.35))
     match kind or random.choice(["ball", "ball", "box", "box", "tin", "tin", "card"]):
         case "ball":
-            return sphere(r), 0.7 * r, r
+            return draw.sphere(r), 0.7 * r, r
         case "box":
-            depth = 2 * r * log_uniform(random, 0.2, 1)
-            return box_of(1.8 * r * stretch, 1.8 * r / stretch, depth), depth / 2, 0.9 * r / stretch
+            depth = 2 * r * draw.log_uniform(random, 0.2, 1)
+            return draw.box_of(1.8 * r * stretch, 1.8 * r / stretch, depth), depth / 2, 0.9 * r / stretch
         case "tin":
-            return cylinder_of(0.8 * r / stretch, 2 * r * stretch), 0.65 * r / stretch, r * stretch
+            return draw.cylinder_of(0.8 * r / stretch, 2 * r * stretch), 0.65 * r / stretch, r * stretch
         case "rod":  # a tin of which a scene can have many
             radius = 0.8 * r / stretch
             return mesh_of(rod(), radius, r * stretch, radius), 0.8 * radius, r * stretch
         case _:
-            return card(2 * r * stretch, 2 * r / stretch), 0.0, r / stretch
+            return draw.card(2 * r * stretch, 2 * r / stretch), 0.0, r / stretch
 
 
 def any_turn(random: Random) -> Triple:
@@ -50,18 +36,18 @@ def any_turn(random: Random) -> Triple:
 
 
 def any_material(random: Random, pixels: int = 512) -> Table:
-    """Noise, one colour, stripes, checks, a star, text or metal."""
-    two = [colour(random, 0.1, 0.5), colour(random, 0.4, 0.9)]
+    """Noise, one draw.colour, stripes, checks, a star, text or metal."""
+    two = [draw.colour(random, 0.1, 0.5), draw.colour(random, 0.4, 0.9)]
     if random.random() < 0.25:
-        return {"reflectance": colour(random, 0.1, 0.9)}
+        return {"reflectance": draw.colour(random, 0.1, 0.9)}
     if random.random() < 0.08:
-        return metal(random.choice(["Ag", "Au", "Cu"]), log_uniform(random, 0.08, 0.5))
+        return draw.metal(random.choice(["Ag", "Au", "Cu"]), draw.log_uniform(random, 0.08, 0.5))
     # All are drawn, and one of them is taken.
     noise = {
         "type": "noise",
         "exponent": round(random.uniform(0.7, 1.5), 2),
         "contrast": round(random.uniform(0.1, 0.35), 2),
-        "colour": colour(random, 0.3, 0.65),
+        "colour": draw.colour(random, 0.3, 0.65),
         "chroma": round(random.uniform(0, 0.5), 2),
         "seed": random.randrange(100_000),
     }
@@ -88,16 +74,16 @@ def nearly_alike(random: Random, material: Table) -> Table:
 
 
 def large_material(random: Random) -> Table:
-    """What walls and floors are of: one colour, shades that change slowly, or patterns."""
+    """What walls and floors are of: one draw.colour, shades that change slowly, or patterns."""
     if random.random() < 0.35:
-        return plain(random)
+        return draw.plain(random)
     if random.random() < 0.6:
         return any_material(random, 1024)
     shades = {
         "type": "noise",
         "exponent": round(random.uniform(1.6, 2.4), 2),
         "contrast": round(random.uniform(0.1, 0.3), 2),
-        "colour": colour(random, 0.3, 0.65),
+        "colour": draw.colour(random, 0.3, 0.65),
         "seed": random.randrange(100_000),
         "pixels": 512,
     }
@@ -113,7 +99,7 @@ def add_wall(
     side_mm: float = 1200,
 ) -> None:
     """Add an upright wall that fills the film."""
-    objects.add(name, (0.0, 0.0, z_mm), UPRIGHT, card(side_mm, side_mm), material(random))
+    objects.add(name, (0.0, 0.0, z_mm), UPRIGHT, draw.card(side_mm, side_mm), material(random))
 
 
 def add_backwall(random: Random, objects: Objects, farthest_mm: float) -> None:
@@ -127,46 +113,46 @@ def add_room(random: Random, objects: Objects, wall_mm: float, floor_mm: float) 
     add_wall(random, objects, wall_mm, large_material)
     middle, long = (wall_mm + 400) / 2, wall_mm - 400
     if random.random() < 0.8:
-        place, shape = (0.0, floor_mm + 200, middle), box_of(1200, 400, long)
+        place, shape = (0.0, floor_mm + 200, middle), draw.box_of(1200, 400, long)
         objects.add("floor", place, UPRIGHT, shape, large_material(random))
     for name, side in (("left", -1), ("right", 1)):
         if random.random() < 0.5:
-            place = side * random.uniform(150, 270), 0.0, middle
-            objects.add(f"{name}-wall", place, (0.0, 90.0, 0.0), card(long, 1000), large_material(random))
+            place, shape = (side * random.uniform(150, 270), 0.0, middle), draw.card(long, 1000)
+            objects.add(f"{name}-wall", place, (0.0, 90.0, 0.0), shape, large_material(random))
 
 
 def add_pictures(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
     """Add up to four pictures on the back wall, some of them in a frame, some of a few patches."""
     for number in range(random.choice([0, 1, 1, 2, 3, 4])):
-        width, height = log_uniform(random, 30, 250), log_uniform(random, 30, 180)
+        width, height = draw.log_uniform(random, 30, 250), draw.log_uniform(random, 30, 180)
         reach = HALF_FIELD * wall_mm
         x, y = random.uniform(-0.8, 0.8) * reach, random.uniform(-0.8 * reach, min(floor_mm, reach) - 20)
         turned = 0.0, 0.0, random.choice([0.0, random.uniform(-8, 8)])
         if random.random() < 0.5:
-            frame = box_of(1.12 * width, 1.12 * height, 3)
-            objects.add(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, plain(random))
-        place, shape = (x, y, wall_mm - 3.3), card(width, height)
+            frame = draw.box_of(1.12 * width, 1.12 * height, 3)
+            objects.add(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, draw.plain(random))
+        place, shape = (x, y, wall_mm - 3.3), draw.card(width, height)
         objects.add(f"picture-{number}", place, turned, shape, any_material(random))
         for patch in range(random.choice([0, 0, 3])):
             place = x + random.uniform(-0.3, 0.3) * width, y + random.uniform(-0.3, 0.3) * height
-            shape = card(random.uniform(0.1, 0.4) * width, random.uniform(0.1, 0.4) * height)
+            shape = draw.card(random.uniform(0.1, 0.4) * width, random.uniform(0.1, 0.4) * height)
             name, z = f"picture-{number}-{patch}", wall_mm - 3.6 - 0.3 * patch
             objects.add(name, (*place, z), turned, shape, any_material(random, 128))
 
 
 def add_narrow_things(random: Random, objects: Objects, z_mm: float) -> None:
     """Add pickets, rods or wires beside each other, of one material, or two layers of them that cross."""
-    width = log_uniform(random, 2.4, 20)
+    width = draw.log_uniform(random, 2.4, 20)
     shape_of = random.choice(
         [
-            lambda long: card(width, long),
-            lambda long: box_of(width, long, log_uniform(random, 1, 12)),
+            lambda long: draw.card(width, long),
+            lambda long: draw.box_of(width, long, draw.log_uniform(random, 1, 12)),
             lambda long: mesh_of(rod(), width / 2, long / 2, width / 2),
         ]
     )
-    spacing, tilt = width * log_uniform(random, 1.5, 6), random.uniform(-90, 90)
+    spacing, tilt = width * draw.log_uniform(random, 1.5, 6), random.uniform(-90, 90)
     count, disorder = max(3, min(24, round(320 / spacing))), random.choice([0.0, 1.0, 12.0])
-    material = plain(random) if random.choice([True, False]) else any_material(random, 256)
+    material = draw.plain(random) if random.choice([True, False]) else any_material(random, 256)
     for layer in range(random.choice([1, 1, 2])):
         long = random.uniform(100, 400)
         for number in range(count):
@@ -191,7 +177,7 @@ def any_lights(random: Random, finishes: set[str]) -> list[Table]:
     Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
     So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
     """
-    even_light = sky(round(log_uniform(random, 20, 400), 1))
+    even_light = draw.sky(round(draw.log_uniform(random, 20, 400), 1))
     kinds = ["area", "area", "none"]
     if "glass" in finishes:
         kinds = ["none"]
@@ -202,8 +188,8 @@ def any_lights(random: Random, finishes: set[str]) -> list[Table]:
         [round(random.uniform(*ends)) for ends in box]
         for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
     )
-    lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
-    side, beam = log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
+    lux, square_m = draw.log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
+    side, beam = draw.log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
     if kind == "none":
         return [even_light]
     luminance = lux * square_m / (side * side / 1e6)
