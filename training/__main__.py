@@ -13,13 +13,12 @@ import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 
-from pcii.base import Executor, InputError, Report, Stages, silent
+from pcii.base import Executor, Report, Stages, silent
 from pcii.depth.surface_network import WEIGHTS
 from simgen.app.library import generate_sweep
 from simgen.spec import Sweep, load_sweep
@@ -63,15 +62,12 @@ def main() -> None:
 
 
 def make_datasets(recipes: Sequence[Path], out: Path, executor: Executor, report: Report) -> list[Path]:
-    """Make a collection of each recipe in a folder of its name, having said how long it takes.
-
-    Raises `InputError` if datasets cannot be made.
-    """
+    """Make a collection of each recipe in a folder of its name, having said how long it takes."""
     sweeps = {out / file.stem: load_sweep(str(file)) for file in recipes}
     total = sum(map(len, sweeps.values()))
     for number, (folder, sweep) in enumerate(sweeps.items(), start=1):
         first = tuple(replace(axis, values=axis.values[:1]) for axis in sweep.axes)
-        _make(replace(sweep, axes=first), folder, Executor(), silent)
+        _make(replace(sweep, axes=first), folder, Executor(), silent, 0, 1)
         report("first dataset of each recipe", number, len(sweeps))
     hours = 0.0
     for folder, sweep in sweeps.items():
@@ -89,20 +85,20 @@ def make_datasets(recipes: Sequence[Path], out: Path, executor: Executor, report
     )
     done = 0
     for folder, sweep in sweeps.items():
-        _make(sweep, folder, executor, partial(_report_all, report, done, total))
+        _make(sweep, folder, executor, report, done, total)
         done += len(sweep)
     return list(sweeps)
 
 
-def _make(sweep: Sweep, folder: Path, executor: Executor, report: Report) -> None:
-    if faults := generate_sweep(sweep, folder, executor, report):
-        raise InputError(f"{folder}: {len(faults)} datasets were not made, the first because {faults[0]}")
+def _make(sweep: Sweep, folder: Path, executor: Executor, report: Report, before: int, total: int) -> None:
+    """Make a collection, and report its datasets among those of all, of which some are made before."""
 
+    def report_all(stage: str, done: int, _: int) -> None:
+        if stage == "datasets":
+            report(stage, before + done, total)
 
-def _report_all(report: Report, before: int, total: int, stage: str, done: int, _: int) -> None:
-    """Report datasets of one collection among those of all."""
-    if stage == "datasets":
-        report(stage, before + done, total)
+    if faults := generate_sweep(sweep, folder, executor, report_all):
+        raise SystemExit(f"{folder}: {len(faults)} datasets were not made, the first because {faults[0]}")
 
 
 if __name__ == "__main__":

@@ -32,14 +32,8 @@ METHOD = PosteriorDepth()
 FILM_MULTIPLE_PX = METHOD.block_px * MULTIPLE
 PIXELS, BLOCKS, CELLS = METHOD.block_px, 1, 0.5
 """Samples along a side of a block, of maps of pixels, of blocks, and of cells of two blocks."""
-SAMPLES_PER_BLOCK = {
-    "plane": PIXELS,
-    "object_number": PIXELS,
-    "evidence": BLOCKS,
-    "brightness": BLOCKS,
-    "coverage": CELLS,
-    "surface": CELLS,
-}
+SAMPLES_PER_BLOCK = {"plane": PIXELS, "object_number": PIXELS, "evidence": BLOCKS, "brightness": BLOCKS}
+SAMPLES_PER_BLOCK |= {"coverage": CELLS, "surface": CELLS}
 
 Example = dict[str, np.ndarray]
 
@@ -50,10 +44,8 @@ def make_examples(folders: Sequence[Path], out: Path, executor: Executor, report
     sources = [(None, out / f"{FLAT_FILM}_draw_{number}_0.npy") for number in range(FLAT_FILMS)]
     for folder in folders:
         for dataset in sorted(path.parent for path in folder.glob("*/manifest.json")):
-            files = [
-                out / f"{folder.name}_{dataset.name}_{number}.npy" for number in range(EXAMPLES_OF_DATASET)
-            ]
-            sources += [(dataset, file) for file in files]
+            stem = f"{folder.name}_{dataset.name}"
+            sources += [(dataset, out / f"{stem}_{number}.npy") for number in range(EXAMPLES_OF_DATASET)]
     missing = [source for source in sources if not source[1].exists()]
     for done, _ in enumerate(executor.run(ExampleJob(missing), range(len(missing))), start=1):
         report("examples", done, len(missing))
