@@ -6,49 +6,38 @@ import torch  # pyright: ignore[reportMissingImports]
 from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
 from pcii.depth.network_inputs import NetworkInputs
-from training.layers import WIDTHS, SurfaceNetwork
+from training.layers import SurfaceNetwork
 
 OPSET = 18
+
+Axes = dict[str, dict[int, str]]
+"""Names of axes by the names of arrays."""
 
 
 def export(network: SurfaceNetwork, folder: Path) -> None:
     """Write `trunk.onnx` and `head.onnx` into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    Z, h, w = 5, 64, 32
-    # Axes whose sizes may differ from those of the example by which a part is traced.
+    network.cpu().eval()
+    # The network is traced by an example, and these are axes whose sizes may differ from the example's.
     blocks, cells = {1: "planes", 2: "rows", 3: "columns"}, {1: "planes", 2: "cell_rows", 3: "cell_columns"}
     features = {0: "planes", 2: "cell_rows", 3: "cell_columns"}
     of_cells = dict.fromkeys(("features", "cell_logit", "cell_mask"), features)
-    evidence, surface = torch.zeros(1, Z, h, w), torch.zeros(1, Z, h // 2, w // 2)
-    maps = evidence, torch.ones_like(evidence), torch.ones_like(surface), surface
-    axes = blocks, blocks, cells, cells, {}, {1: "planes"}
-    _write(
-        network.trunk,
-        (*maps, torch.ones(1, 1), torch.zeros(1, Z, 2)),
-        folder / "trunk.onnx",
-        dict(zip(NetworkInputs._fields, axes, strict=True)),
-        of_cells | {"nothing": {2: "cell_rows", 3: "cell_columns"}},
-    )
-    logit = torch.zeros(Z, 1, h // 2, w // 2)
-    _write(
-        network.head,
-        (logit.expand(-1, WIDTHS[0], -1, -1).clone(), logit, logit, evidence, evidence),
-        folder / "head.onnx",
-        of_cells | {"evidence": blocks, "brightness": blocks},
-        {"logit": blocks, "mask": blocks},
-    )
+    maps = [torch.ones(1, 5, *sides) for sides in ((64, 32), (64, 32), (32, 16), (32, 16))]
+    inputs, axes = (*maps, torch.ones(1, 1), torch.zeros(1, 5, 2)), (blocks, blocks, cells, cells, {})
+    names = dict(zip(NetworkInputs._fields, (*axes, {1: "planes"}), strict=True))
+    outputs = of_cells | {"nothing": {2: "cell_rows", 3: "cell_columns"}}
+    _write(network.trunk, inputs, folder / "trunk.onnx", names, outputs)
+    with torch.no_grad():
+        *inputs, _ = network.trunk(*inputs)
+    names = of_cells | {"evidence": blocks, "brightness": blocks}
+    outputs = {"logit": blocks, "mask": blocks}
+    _write(network.head, (*inputs, *maps[:2]), folder / "head.onnx", names, outputs)
 
 
-def _write(
-    module: nn.Module,
-    example: tuple[Tensor, ...],
-    file: Path,
-    inputs: dict[str, dict[int, str]],
-    outputs: dict[str, dict[int, str]],
-) -> None:
+def _write(module: nn.Module, example: tuple[Tensor, ...], file: Path, inputs: Axes, outputs: Axes) -> None:
     """Write a part of the network, with the names of inputs and outputs and of their axes."""
     torch.onnx.export(
-        module.cpu().eval(),
+        module,
         example,
         file,
         input_names=list(inputs),

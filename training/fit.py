@@ -41,13 +41,13 @@ class Training:
             self.network.parameters(), lr=RATE, weight_decay=DECAY, betas=(0.9, 0.99)
         )
         self.file, self.state_file = file, file.with_suffix(".state")
-        self.steps, self.minutes, self.curve = 0, 0.0, list[list[str]]()
+        self.steps, self.minutes = 0, 0.0
         if self.state_file.is_file():
             state = torch.load(self.state_file, weights_only=True, map_location=DEVICE)
             self.network.load_state_dict(state["network"])
             self.averaged.load_state_dict(state["averaged"])
             self.optimizer.load_state_dict(state["optimizer"])
-            self.steps, self.minutes, self.curve = state["steps"], state["minutes"], state["curve"]
+            self.steps, self.minutes = state["steps"], state["minutes"]
 
     def fit(self, examples: Examples, minutes: float, threads: int = 1, report: Report = silent) -> None:
         """Train until it took `minutes` in all; writes weights, state and curve from time to time."""
@@ -60,9 +60,8 @@ class Training:
             while self.minutes < minutes:
                 losses.append(self.step(next(batches), self.minutes / minutes))
                 self.minutes = before + (time.monotonic() - start) / 60
-                report(
-                    "seconds of training", *(round(60 * (end - before)) for end in (self.minutes, minutes))
-                )
+                done, total = (round(60 * (end - before)) for end in (self.minutes, minutes))
+                report("seconds of training", min(done, total), total)
                 if self.minutes >= min(written + minutes / CURVE_ROWS, minutes):
                     written = self.minutes
                     self._write(losses, examples)
@@ -90,17 +89,15 @@ class Training:
     def _write(self, losses: list[Tensor], examples: Examples) -> None:
         """Write weights, state and curve, and print how it stands."""
         loss = float(torch.stack(losses).mean()) if losses else np.nan
-        row = [self.minutes, self.steps, loss, *judge(self.averaged, examples)]
-        self.curve.append([f"{value:.4g}" for value in row])
-        print(", ".join(f"{name} {value}" for name, value in zip(COLUMNS, self.curve[-1], strict=True)))
+        row = [f"{value:.4g}" for value in (self.minutes, self.steps, loss, *judge(self.averaged, examples))]
+        print(", ".join(f"{name} {value}" for name, value in zip(COLUMNS, row, strict=True)), flush=True)
+        with self.file.with_suffix(".csv").open("a") as stream:
+            csv.writer(stream).writerows([row] if stream.tell() else [COLUMNS, row])
         torch.save(self.averaged.state_dict(), self.file)
         state = {name: getattr(self, name).state_dict() for name in ("network", "averaged", "optimizer")}
-        state |= {name: getattr(self, name) for name in ("steps", "minutes", "curve")}
         unfinished = self.state_file.with_suffix(".new")
-        torch.save(state, unfinished)
+        torch.save(state | {"steps": self.steps, "minutes": self.minutes}, unfinished)
         unfinished.replace(self.state_file)
-        with self.file.with_suffix(".csv").open("w", newline="") as stream:
-            csv.writer(stream).writerows([COLUMNS, *self.curve])
 
 
 def judge(network: SurfaceNetwork, examples: Examples) -> np.ndarray:

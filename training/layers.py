@@ -98,15 +98,8 @@ class Trunk(nn.Module):
         for start_at_zero in (self.hint, self.logit, self.mask):
             nn.init.zeros_(start_at_zero.weight)
 
-    def forward(
-        self,
-        evidence: Tensor,
-        brightness: Tensor,
-        coverage: Tensor,
-        surface: Tensor,
-        light: Tensor,
-        hint: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        evidence, brightness, coverage, surface, light, hint = inputs  # those of `NetworkInputs`
         films = surface.shape[0]
         cell_brightness = f.avg_pool2d(brightness**2, 2).clamp(min=1e-6).sqrt()
         level = (light / 3).view(-1, 1, 1, 1).expand_as(surface)
@@ -139,14 +132,8 @@ class Head(nn.Module):
         nn.init.zeros_(self.logit.weight)
         nn.init.zeros_(self.mask.weight)
 
-    def forward(
-        self,
-        features: Tensor,
-        cell_logit: Tensor,
-        cell_mask: Tensor,
-        evidence: Tensor,
-        brightness: Tensor,
-    ) -> tuple[Tensor, Tensor]:
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+        features, cell_logit, cell_mask, evidence, brightness = inputs
         own = evidence[:, :, None]
         of_blocks = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
         x = torch.cat([f.pixel_shuffle(self.spread(features), 2), of_blocks.flatten(0, 1)], dim=1)
