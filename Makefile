@@ -8,8 +8,8 @@
 # make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
 # make bench-publish  make bench, then docs/benchmarks.md, the committed ratios and the figures that pages quote from
 #             it; on an idle machine
-# make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours. Goes on
-#             from where it was stopped
+# make train  weights of the network of depth: draws scenes, makes examples, trains for TRAIN_MINUTES; hours, on
+#             all cores or WORKERS of them, and a GPU where there is one. Goes on from where it was stopped
 # make docs   the site of docs/*.md and the API, in out/docs
 # make notebooks  the outputs of examples/notebooks anew, by running them
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
@@ -86,13 +86,7 @@ bench-publish: bench
 
 train: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[train]'
-	for recipe in training/recipes/*.toml; do \
-	  $(BIN)/simgen generate $$recipe --trust-python --out $(OUT)/training/$$(basename $$recipe .toml) || exit; \
-	done
-	$(BIN)/python -m training.samples $(OUT)/training/* --out $(OUT)/training-examples
-	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES) \
-	  $(if $(wildcard $(OUT)/depth.state),--resume)
-	$(BIN)/python -m training.export $(OUT)/depth.pt
+	$(BIN)/python -m training --out $(OUT) --minutes $(TRAIN_MINUTES) $(addprefix --workers ,$(WORKERS))
 
 docs: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

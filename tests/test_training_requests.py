@@ -1,16 +1,16 @@
-"""Which object of a training example belongs to which of the planes that it is asked for."""
+"""Which object of a training example belongs to which of the requested planes."""
 
 import numpy as np
 
 from training.requests import NOT_COUNTED, draw_request, targets_of
 
-# Id, median plane, planes that it reaches over, share of the film.
+# Median plane, planes that it reaches over, share of the film.
 NEAR, FAR, BETWEEN, LEANING, AWAY = (
-    (1, 11.0, 3.0, 0.1),
-    (2, 39.0, 3.0, 0.1),
-    (3, 19.0, 3.0, 0.1),
-    (4, 12.0, 20.0, 0.1),
-    (5, 60.0, 2.0, 0.1),
+    (11.0, 3.0, 0.1),
+    (39.0, 3.0, 0.1),
+    (19.0, 3.0, 0.1),
+    (12.0, 20.0, 0.1),
+    (60.0, 2.0, 0.1),
 )
 
 
@@ -21,8 +21,8 @@ def test_an_object_belongs_to_the_nearest_requested_plane_or_to_none() -> None:
     assert (targets_of(objects, np.zeros(0)) == NOT_COUNTED).all()
 
 
-def test_walls_are_asked_for_as_often_as_not_and_planes_stay_within_the_sweep() -> None:
-    objects = np.array([NEAR, (2, 50.0, 4.0, 0.6)], np.float32)
+def test_walls_are_requested_as_often_as_not_and_planes_stay_within_the_sweep() -> None:
+    objects = np.array([NEAR, (50.0, 4.0, 0.6)], np.float32)
     rng = np.random.default_rng(1)
     requests = [draw_request(objects, np.array([10.0, 90.0]), 64, rng) for _ in range(2000)]
     planes = [request.planes for request in requests]

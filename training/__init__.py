@@ -1,13 +1,6 @@
 """How the network of depth and masks is made (`make train`); nothing here is needed to use it.
 
-examples     Batches of examples: parts of films, each with a request of its own.
-export       Write trained weights as the files that `pcii` runs.
-fit          Train the network on examples.
-layers       The network in PyTorch.
-mesh_shapes  Curved shapes as meshes, for scenes.
-more_scenes  Further scenes: rooms, heaps, narrow, plain, leaning and glossy things.
-recipes      Datasets to make examples of, for `simgen generate`.
-requests     Which planes an example is asked for, and which object belongs to which of them.
-samples      Examples: inputs of the network for datasets, at random amounts of light, with the truth.
-scenes       Scenes that are for training alone.
+Datasets of `recipes` become `examples`, with `flat_films` among them. Of these come `batches`, each example
+with one of its `requests`; `fit` trains the network of `layers` by its `losses`, and `exported_files` are
+what `pcii` runs. `__main__` does all of it in its order.
 """

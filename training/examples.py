@@ -1,145 +1,147 @@
-"""Batches of examples: parts of films, mirrored and transposed at random, each with a request of its own."""
+"""Examples to train on: inputs of the network for datasets, at random amounts of light, with the truth.
 
+Each example is a file, and one that is there is not made again. Photons are thinned at random, by which
+Poisson counts stay Poisson counts, to between `MIN_PHOTONS` per view and all, evenly in their logarithm.
+Which planes are requested is not part of an example: `training.requests` draws that at each use.
+"""
+
+import io
 import zlib
-from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from pcii.depth.network_inputs import NetworkInputs, hint_of
+import pcii
+from pcii.base import Executor, Report, write_bytes_safely
+from pcii.depth import PosteriorDepth
 from pcii.depth.surface_network import MULTIPLE
-from training.requests import draw_request
-from training.samples import Example, window
+from pcii.evidence import evidence_of_texture, without_hot_pixels
+from pcii.types import FocalPlanes, PhotonCounts, Truth, total_disparity_px
+from training.flat_films import FLAT_FILM, draw_flat_film
 
-HELD_OUT = 24
-"""One dataset in this many is not trained on."""
-MAX_VALUES = {"cpu": 3_000_000, "cuda": 24_000_000}
-"""Largest number of blocks times planes of a step."""
-SIDES = (96, 128, 192, 256)
-"""Blocks along the sides of the parts of films; those of a step are alike. Narrow things are learned from
-many small parts, wide ones and empty film from whole films."""
-WAITING_BATCHES = 8
-"""Batches that are ready before their step."""
-DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
+EXAMPLES_OF_DATASET = 2
+FLAT_FILMS = 200
+MIN_PHOTONS = 30.0
+NEAR, FAR = (0.75, 0.95), (1.05, 1.4)
+"""How far the range of depths goes beyond the planes of a scene, as factors of the depth of its ends."""
+MAX_VALUES = 1 << 22
+"""Largest number of blocks times planes of an example; what is larger is cut to a part of the film."""
+METHOD = PosteriorDepth()
+FILM_MULTIPLE_PX = METHOD.block_px * MULTIPLE
+PIXELS, BLOCKS, CELLS = METHOD.block_px, 1, 0.5
+"""Samples along a side of a block, of maps of pixels, of blocks, and of cells of two blocks."""
+SAMPLES_PER_BLOCK = {"plane": PIXELS, "object_number": PIXELS, "evidence": BLOCKS, "brightness": BLOCKS}
+SAMPLES_PER_BLOCK |= {"coverage": CELLS, "surface": CELLS}
+
+Example = dict[str, np.ndarray]
 
 
-class Batch(NamedTuple):
-    """Inputs of B examples with as many planes, and what is true of them.
+def make_examples(folders: Sequence[Path], out: Path, executor: Executor, report: Report) -> None:
+    """Make the examples of all datasets in these folders of collections, and of flat films, in `out`."""
+    out.mkdir(parents=True, exist_ok=True)
+    sources = [(None, out / f"{FLAT_FILM}_draw_{number}_0.npy") for number in range(FLAT_FILMS)]
+    for folder in folders:
+        for dataset in sorted(path.parent for path in folder.glob("*/manifest.json")):
+            stem = f"{folder.name}_{dataset.name}"
+            sources += [(dataset, out / f"{stem}_{number}.npy") for number in range(EXAMPLES_OF_DATASET)]
+    missing = [source for source in sources if not source[1].exists()]
+    for done, _ in enumerate(executor.run(ExampleJob(missing), range(len(missing))), start=1):
+        report("examples", done, len(missing))
 
-    `plane` (B, h, w) is the true plane as a fraction, NaN where there is none; `planes` (B, R) are requested
-    ones, NaN beyond an example's own; `target` (B, h, w) is a number of these, R for none, or `NOT_COUNTED`.
+
+class ExampleJob:
+    """Writes examples: of each the folder of its dataset, None for a flat film, and its file."""
+
+    def __init__(self, sources: Sequence[tuple[Path | None, Path]]) -> None:
+        self.sources = sources
+
+    def __call__(self, number: int) -> None:
+        """Write an example; the name of its file decides on all that is random."""
+        folder, file = self.sources[number]
+        rng = np.random.default_rng(zlib.crc32(file.stem.encode()))
+        if folder is None:
+            counts, z_mm = draw_flat_film(rng, MIN_PHOTONS)
+            shape = counts.grid.shape_HW
+            truth = Truth(np.full(shape, np.inf), np.zeros(shape, np.int16), {})
+        else:
+            dataset = pcii.open_dataset(folder)
+            views, z_mm = dataset.grid.view_count, np.asarray(dataset.analysis["z_mm"])
+            brightest = max(dataset.counts.total / views, MIN_PHOTONS)
+            photons = views * np.exp(rng.uniform(np.log(MIN_PHOTONS), np.log(brightest)))
+            counts, truth = dataset.counts.subsample(photons, rng), dataset.truth
+            assert truth is not None
+        write_example(example_of(counts, truth, z_mm, rng), file)
+
+
+def example_of(counts: PhotonCounts, truth: Truth, z_mm: np.ndarray, rng: np.random.Generator) -> Example:
+    """Inputs without a hint at half precision, and the truth, of a film or of a part of it.
+
+    `plane` (H, W) float32 is the true plane as a fraction, NaN beyond them; `object_number` (H, W) int16 is
+    that of a row of `objects`, from 1, or 0; `objects` (N, 3) float32 are median plane, planes that an object
+    reaches over, and share of the film; `named_planes` (R,) float32 the planes at the depths `z_mm` (R,) that
+    the scene names. Sides of films are whole multiples of `FILM_MULTIPLE_PX`.
     """
-
-    inputs: list[Tensor]
-    plane: Tensor
-    planes: Tensor
-    target: Tensor
-
-
-class Examples:
-    """Examples of a folder, read ahead of their use."""
-
-    def __init__(self, folder: Path, pool: ThreadPoolExecutor) -> None:
-        files = sorted(folder.glob("*.npz"))
-        self.plane_count = dict(zip(files, pool.map(_plane_count, files), strict=True))
-        self.held_out = [file for file in files if _is_held_out(file)]
-        self.kinds: dict[str, list[Path]] = {}
-        self.of_planes: dict[int, list[Path]] = {}
-        for file in files:
-            if not _is_held_out(file):
-                self.kinds.setdefault(file.stem.split("_draw_")[0].split("scene_")[-1], []).append(file)
-                self.of_planes.setdefault(self.plane_count[file], []).append(file)
-
-    def batches(self, rng: np.random.Generator, pool: ThreadPoolExecutor) -> Iterator[Batch]:
-        """Batches without end: an example of any kind of scene, all kinds alike, and others of as many
-        planes."""
-        kinds, waiting = list(self.kinds.values()), deque[Future[Batch]]()
-        while True:
-            while len(waiting) < WAITING_BATCHES:
-                kind = kinds[rng.integers(len(kinds))]
-                first = kind[rng.integers(len(kind))]
-                planes = self.plane_count[first]
-                side = SIDES[rng.integers(len(SIDES))]
-                count = max(1, MAX_VALUES[DEVICE] // (planes * side**2))
-                alike = self.of_planes[planes]
-                files = [first, *(alike[at] for at in rng.integers(len(alike), size=count - 1))]
-                task = self.batch, files, side, np.random.default_rng(rng.integers(2**32))
-                waiting.append(pool.submit(*task))
-            yield _on_device(waiting.popleft().result())
-
-    def batch(self, files: list[Path], side: int, rng: np.random.Generator) -> Batch:
-        """Square parts of examples, `side` blocks wide or as wide as the narrowest of their films."""
-        examples = [_read(file) for file in files]
-        sides = (size for each in examples for size in each["evidence"].shape[1:])
-        side = min(side, *sides) // MULTIPLE * MULTIPLE
-        parts = [_part(example, side, rng) for example in examples]
-        requests = [
-            draw_request(each["objects"], each["named_planes"], self.plane_count[files[0]], rng)
-            for each in examples
-        ]
-        most = max(request.planes.size for request in requests)
-        planes = np.full((len(files), most), np.nan, np.float32)
-        targets, hints = [], []
-        for number, (part, request) in enumerate(zip(parts, requests, strict=True)):
-            planes[number, : request.planes.size] = request.planes
-            of_id = np.full(
-                max(int(part["object_id"].max()), int(part["objects"][:, 0].max(initial=0))) + 1, 0
-            )
-            of_id[part["objects"][:, 0].astype(int)] = np.arange(1, len(part["objects"]) + 1)
-            targets.append(request.targets[of_id[np.maximum(part["object_id"], 0)]])
-            hints.append(hint_of(self.plane_count[files[0]], request.planes))
-        for target, request in zip(targets, requests, strict=True):
-            target[target == request.planes.size] = most
-        stacked = {name: np.stack([part[name] for part in parts]) for name in NetworkInputs._fields[:-1]}
-        inputs = [torch.from_numpy(values.astype(np.float32)) for values in stacked.values()]
-        return Batch(
-            [*inputs, torch.from_numpy(np.stack(hints))],
-            torch.from_numpy(np.stack([part["plane"] for part in parts])),
-            torch.from_numpy(planes),
-            torch.from_numpy(np.stack(targets)),
-        )
+    grid = counts.grid
+    assert not any(size % FILM_MULTIPLE_PX for size in grid.shape_HW), grid
+    planes = FocalPlanes.between(grid, rng.uniform(*NEAR) * z_mm.min(), rng.uniform(*FAR) * z_mm.max(), 1.0)
+    counts, _ = without_hot_pixels(counts, planes)
+    evidence = evidence_of_texture(counts, planes, METHOD.block_px, METHOD.model)
+    inputs = METHOD.network_inputs(evidence, planes, METHOD.block_px, np.zeros(0))._asdict()
+    del inputs["hint"]
+    place = plane_of(planes, total_disparity_px(grid, np.where(truth.z_mm > 0, truth.z_mm, np.inf)))
+    is_inside = (place > -0.5) & (place < len(planes) - 0.5) & np.isfinite(truth.z_mm)
+    ids = np.unique(truth.object_id[truth.object_id > 0])
+    numbers = np.searchsorted(ids, truth.object_id) + 1
+    example = {name: part.astype(np.float16) for name, part in inputs.items()} | {
+        "plane": np.where(is_inside, place, np.nan).astype(np.float32),
+        "object_number": np.where(truth.object_id > 0, numbers, 0).astype(np.int16),
+        "objects": objects_of(truth.object_id, ids, place),
+        "named_planes": plane_of(planes, total_disparity_px(grid, z_mm)).astype(np.float32),
+    }
+    Z, h, w = example["evidence"].shape
+    side = int(np.sqrt(MAX_VALUES / Z)) // 16 * 16
+    top, left = (int(rng.integers(0, max(1, (size - side) // 16 + 1))) * 16 for size in (h, w))
+    return {name: window(name, values, top, left, side) for name, values in example.items()}
 
 
-def _part(example: Example, side: int, rng: np.random.Generator) -> Example:
-    """A square part of an example, `side` blocks wide; of the truth a random pixel of each block."""
-    h, w = example["evidence"].shape[1:]
-    top, left = (2 * int(rng.integers(0, (size - side) // 2 + 1)) for size in (h, w))
-    down, right = rng.integers(0, 2, 2)
-    flips = [axis for axis in (-1, -2) if rng.random() < 0.5]
-    is_transposed = rng.random() < 0.5
-    part = {}
+def plane_of(planes: FocalPlanes, total_px: np.ndarray) -> np.ndarray:
+    """Where among the planes total disparities are, 0 the first, as fractions."""
+    total = planes.total_disparity_px
+    return (total_px - total[0]) / ((total[-1] - total[0]) / (len(planes) - 1))
+
+
+def objects_of(object_id: np.ndarray, ids: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Median plane, planes between the 2nd and 98th percentile, share of the film: (N, 3) float32."""
+    rows = []
+    for own in (place[object_id == each] for each in ids):
+        low, middle, high = np.percentile(own[np.isfinite(own)], [2, 50, 98])
+        rows.append((middle, high - low, own.size / place.size))
+    return np.array(rows, np.float32).reshape(-1, 3)
+
+
+def window(name: str, values: Any, top: int, left: int, side: int) -> Any:
+    """The rows and columns of a part of an example's array, whose place and side are given in blocks."""
+    if name not in SAMPLES_PER_BLOCK:
+        return values
+    scale = SAMPLES_PER_BLOCK[name]
+    rows, columns = (slice(int(at * scale), int((at + side) * scale)) for at in (top, left))
+    return values[..., rows, columns]
+
+
+def write_example(example: Example, file: Path) -> None:
+    """Write an example as a file of one record, which can be mapped into memory."""
+    fields = [(name, values.dtype, values.shape) for name, values in example.items()]
+    record = np.zeros(1, np.dtype(fields, align=True))
     for name, values in example.items():
-        own = window(name, values, top, left, side)
-        if name in ("plane", "object_id"):
-            own = own[down::2, right::2]
-        if own.ndim > 1 and name != "objects":
-            own = np.flip(own, flips)
-            own = np.ascontiguousarray(own.swapaxes(-1, -2) if is_transposed else own)
-        part[name] = own
-    return part
+        record[0][name] = values
+    content = io.BytesIO()
+    np.save(content, record)
+    write_bytes_safely(file, content.getvalue())
 
 
-def _on_device(batch: Batch) -> Batch:
-    inputs = [values.to(DEVICE, non_blocking=True) for values in batch.inputs]
-    return Batch(inputs, *(values.to(DEVICE, non_blocking=True) for values in batch[1:]))
-
-
-def _read(file: Path) -> Example:
-    with np.load(file) as parts:
-        return dict(parts)
-
-
-def _plane_count(file: Path) -> int:
-    with np.load(file) as parts, parts.zip.open("evidence.npy") as stream:
-        np.lib.format.read_magic(stream)
-        return np.lib.format.read_array_header_1_0(stream)[0][0]
-
-
-def _is_held_out(file: Path) -> bool:
-    """Whether an example is kept for the curve; all of a dataset are, or none."""
-    return zlib.crc32(file.stem.rsplit("_", 1)[0].encode()) % HELD_OUT == 0
+def read_example(file: Path, *, is_mapped: bool = False) -> Example:
+    """An example, read into memory or, if `is_mapped`, from the file whenever it is used."""
+    record = np.load(file, mmap_mode="c" if is_mapped else None)[0]
+    return {name: record[name] for name in record.dtype.names}

@@ -1,46 +1,23 @@
-"""Examples of films that show no depth: even light, vignetting, shading, flicker and hot pixels.
-
-    python -m training.flat_films --count 200 --out FOLDER
+"""Films that show no depth: even light, vignetting, shading, flicker and hot pixels.
 
 They need no renderer. What the network is to learn from them is that there is no surface, at any light.
 """
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import depth_of_total_disparity_mm
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
-from training.samples import MIN_PHOTONS, Example, example_of, write
+from pcii.types import CameraGrid, PhotonCounts, depth_of_total_disparity_mm
 
+FLAT_FILM = "flat_film"
 MAX_PHOTONS = 1e6
 GRIDS = (3, 3), (5, 5), (10, 10), (10, 10), (15, 15)
 SIDES_PX = 128, 192, 256, 384
 FAR_PX, SPAN_PX = (4.0, 40.0), (4.0, 30.0)
-"""Total disparity of the farthest plane that a film is asked about, and how much nearer the nearest is."""
+"""Total disparity of the farthest plane that is named, and how much nearer the nearest is."""
 HOT_SHARE = 1e-3
 
 
-def main() -> None:
-    """Write the examples that the command line says."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--count", type=int, default=200)
-    arguments = parser.parse_args()
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    for number in range(arguments.count):
-        file = arguments.out / f"scene_flat_film_draw_{number}_0.npz"
-        if not file.exists():
-            write(flat_film(np.random.default_rng((0, number))), file)
-
-
-def flat_film(rng: np.random.Generator) -> Example:
-    """The example of a film without depth, of any of the kinds or several of them at once."""
+def draw_flat_film(rng: np.random.Generator, min_photons: float) -> tuple[PhotonCounts, np.ndarray]:
+    """Photons of a film without depth, of any of the kinds or several of them at once, and named depths."""
     rows, cols = GRIDS[rng.integers(len(GRIDS))]
     height, width = rng.choice(SIDES_PX, 2).tolist()
     grid = CameraGrid(
@@ -48,16 +25,14 @@ def flat_film(rng: np.random.Generator) -> Example:
     )
     far_px = rng.uniform(*FAR_PX)
     planes_px = far_px + rng.uniform(*SPAN_PX) * np.sort(rng.random(rng.integers(1, 4)))
-    photons = np.exp(rng.uniform(np.log(MIN_PHOTONS), np.log(MAX_PHOTONS)))
-    light = light_without_depth(grid, rng)
+    photons = np.exp(rng.uniform(np.log(min_photons), np.log(MAX_PHOTONS)))
+    light = draw_light_without_depth(grid, rng)
     film = rng.poisson(light * (photons / light[0, 0].sum()))
-    cfa = "GRBG" if rng.random() < 0.7 else None
-    counts = PhotonCounts.from_dense(film, grid, cfa=cfa)
-    truth = Truth(np.full((height, width), np.inf), np.zeros((height, width), np.int16), {})
-    return example_of(counts, truth, depth_of_total_disparity_mm(grid, planes_px), rng)
+    counts = PhotonCounts.from_dense(film, grid, cfa="GRBG" if rng.random() < 0.7 else None)
+    return counts, depth_of_total_disparity_mm(grid, planes_px)
 
 
-def light_without_depth(grid: CameraGrid, rng: np.random.Generator) -> np.ndarray:
+def draw_light_without_depth(grid: CameraGrid, rng: np.random.Generator) -> np.ndarray:
     """Light (K, L, H, W) that belongs to the films, or varies too slowly to show a depth."""
     y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in (grid.height, grid.width)), indexing="ij")
     light = np.ones(grid.shape_KLHW)
@@ -71,7 +46,3 @@ def light_without_depth(grid: CameraGrid, rng: np.random.Generator) -> np.ndarra
     if rng.random() < 0.3:  # hot pixels
         light += rng.uniform(1, 20) * (rng.random((grid.height, grid.width)) < HOT_SHARE)
     return light
-
-
-if __name__ == "__main__":
-    main()

@@ -9,15 +9,15 @@ there.
 """
 
 from itertools import pairwise
-from pathlib import Path
 
-import torch
-import torch.nn.functional as f
-from torch import Tensor, nn
+import torch  # pyright: ignore[reportMissingImports]
+import torch.nn.functional as f  # pyright: ignore[reportMissingImports]
+from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
 WIDTHS = (16, 32, 56, 80, 80)
 """Channels of cells of 4, 8, 16, 32 and 64 px."""
 HEAD = 8
+"""Channels of blocks."""
 STEPS = (1, -1, 4, -4)
 MOVED = 8
 """One channel in `MOVED` is exchanged by each of the steps."""
@@ -98,15 +98,8 @@ class Trunk(nn.Module):
         for start_at_zero in (self.hint, self.logit, self.mask):
             nn.init.zeros_(start_at_zero.weight)
 
-    def forward(
-        self,
-        evidence: Tensor,
-        brightness: Tensor,
-        coverage: Tensor,
-        surface: Tensor,
-        light: Tensor,
-        hint: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        evidence, brightness, coverage, surface, light, hint = inputs  # those of `NetworkInputs`
         films = surface.shape[0]
         cell_brightness = f.avg_pool2d(brightness**2, 2).clamp(min=1e-6).sqrt()
         level = (light / 3).view(-1, 1, 1, 1).expand_as(surface)
@@ -139,14 +132,8 @@ class Head(nn.Module):
         nn.init.zeros_(self.logit.weight)
         nn.init.zeros_(self.mask.weight)
 
-    def forward(
-        self,
-        features: Tensor,
-        cell_logit: Tensor,
-        cell_mask: Tensor,
-        evidence: Tensor,
-        brightness: Tensor,
-    ) -> tuple[Tensor, Tensor]:
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+        features, cell_logit, cell_mask, evidence, brightness = inputs
         own = evidence[:, :, None]
         of_blocks = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
         x = torch.cat([f.pixel_shuffle(self.spread(features), 2), of_blocks.flatten(0, 1)], dim=1)
@@ -169,29 +156,8 @@ class SurfaceNetwork(nn.Module):
         super().__init__()
         self.trunk, self.head = Trunk(), Head()
 
-    def forward(
-        self,
-        evidence: Tensor,
-        brightness: Tensor,
-        coverage: Tensor,
-        surface: Tensor,
-        light: Tensor,
-        hint: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        *cells, nothing = self.trunk(evidence, brightness, coverage, surface, light, hint)
+    def forward(self, evidence: Tensor, brightness: Tensor, *others: Tensor) -> tuple[Tensor, Tensor]:
+        *cells, nothing = self.trunk(evidence, brightness, *others)
         logit, mask = self.head(*cells, evidence, brightness)
         nothing = f.interpolate(nothing, scale_factor=2.0, mode="nearest")
         return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1), mask
-
-    def load_exported(self, folder: Path) -> None:
-        """Take the weights of `trunk.onnx` and `head.onnx`; layers that these do not have stay as they
-        are."""
-        import onnx
-        from onnx import numpy_helper
-
-        for part, name in ((self.trunk, "trunk"), (self.head, "head")):
-            graph = onnx.load(folder / f"{name}.onnx").graph
-            own = part.state_dict()
-            weights = {one.name: numpy_helper.to_array(one) for one in graph.initializer if one.name in own}
-            state = {key: torch.from_numpy(values.copy()) for key, values in weights.items()}
-            part.load_state_dict(own | state)

@@ -1,4 +1,4 @@
-"""Which planes an example is asked for, and which object belongs to which of them.
+"""Which planes are requested of an example, and which object belongs to which of them.
 
 An object belongs to the requested plane that its median is nearest to, if within `NEAR_PX` of total
 disparity, and to none of them beyond `FAR_PX`. In between, and where it leans over more than `LEANING_PX`
@@ -12,7 +12,7 @@ import numpy as np
 NEAR_PX, FAR_PX, LEANING_PX = 5.0, 12.0, 16.0
 WALL_SHARE = 0.2
 """Objects that fill a larger share of the film, away from all planes that the scene names, are walls: they
-are asked for as often as not."""
+are requested as often as not."""
 NO_REQUEST, LEFT_OUT, EMPTY_PLANE = 0.15, 0.3, 0.2
 """Shares of examples without a request, of planes that are left out of one, and of requests for an empty
 plane more."""
@@ -33,10 +33,10 @@ class Request(NamedTuple):
 def draw_request(
     objects: np.ndarray, named_planes: np.ndarray, plane_count: int, rng: np.random.Generator
 ) -> Request:
-    """A random request for an example with these `objects` (N, 4) (see `training.samples`)."""
-    middles = objects[:, 1]
+    """A random request for an example with these `objects` (N, 3) (see `training.examples`)."""
+    middles = objects[:, 0]
     away = np.abs(middles[:, None] - named_planes).min(axis=1, initial=np.inf)
-    walls = middles[(objects[:, 3] > WALL_SHARE) & (away > FAR_PX)]
+    walls = middles[(objects[:, 2] > WALL_SHARE) & (away > FAR_PX)]
     planes = np.concatenate(
         [named_planes[rng.random(named_planes.size) >= LEFT_OUT], walls[rng.random(walls.size) < 0.5]]
     )
@@ -52,13 +52,13 @@ def draw_request(
 
 
 def targets_of(objects: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """The target (N + 1,) of no object and of each of the `objects` (N, 4), int64."""
+    """The target (N + 1,) of no object and of each of the `objects` (N, 3), int64."""
     targets = np.full(len(objects) + 1, NOT_COUNTED)
     if planes.size == 0:
         return targets
     targets[0] = planes.size
-    distance = np.abs(objects[:, 1, None] - planes)
-    nearest, reach = distance.min(axis=1), objects[:, 2]
+    distance = np.abs(objects[:, 0, None] - planes)
+    nearest, reach = distance.min(axis=1), objects[:, 1]
     is_none = (nearest > FAR_PX) & (nearest - reach / 2 > NEAR_PX)
     is_near = (nearest <= NEAR_PX) & (reach <= LEANING_PX)
     targets[1:] = np.where(is_near, distance.argmin(axis=1), np.where(is_none, planes.size, NOT_COUNTED))

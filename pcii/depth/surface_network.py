@@ -2,7 +2,8 @@
 
 A likelihood says at which depth a block shows texture; that a plain ball bulges between its outlines, that
 an outline belongs to the nearer side, and that blur around bright things is no surface, is learned. The
-network's weights are in `weights`; `training` has the commands that make them. It runs by ONNX Runtime.
+network's weights are in `weights`, with a card that says what it has seen; `training` makes them. It runs by
+ONNX Runtime.
 """
 
 from functools import cache
@@ -16,7 +17,7 @@ from pcii.depth.network_inputs import CELL_SIDE_BLOCKS, NetworkInputs
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
 
-WEIGHTS = Path(__file__).parent / "weights"
+WEIGHTS = Path(__file__).parent / "weights" / "2026-12"
 MULTIPLE = 32
 """Blocks of a cell of the network's coarsest level, of which films are whole numbers."""
 TEMPERATURE = 1.5
@@ -56,7 +57,7 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
 
     from pcii.base.compiled_loops import each_in_threads, threads
 
-    trunk, head = _sessions(threads())
+    trunk, head = _sessions(WEIGHTS, threads())
     options = onnxruntime.RunOptions()
     # Else the memory of the widest step is kept as long as the process runs.
     options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
@@ -139,7 +140,7 @@ def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _sessions(threads: int) -> "tuple[InferenceSession, InferenceSession]":
+def _sessions(weights: Path, threads: int) -> "tuple[InferenceSession, InferenceSession]":
     """The network up to cells of 4 px, on a number of threads, and its last step, on the caller's thread."""
     import onnxruntime
 
@@ -149,7 +150,7 @@ def _sessions(threads: int) -> "tuple[InferenceSession, InferenceSession]":
         # Threads that wait by spinning would take the cores of other processes.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         return onnxruntime.InferenceSession(
-            WEIGHTS / f"{name}.onnx", options, providers=["CPUExecutionProvider"]
+            weights / f"{name}.onnx", options, providers=["CPUExecutionProvider"]
         )
 
     return session("trunk", threads), session("head", 1)

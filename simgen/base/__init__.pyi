@@ -1,7 +1,8 @@
 from . import random_streams as random_streams
 from .file_lookup import AssetName as AssetName, EnvironmentName as EnvironmentName, ImageName as ImageName
 from .file_lookup import LARGEST_FILE_BYTES as LARGEST_FILE_BYTES, LONGEST_NAME as LONGEST_NAME
-from .file_lookup import MeshName as MeshName, asset as asset, cached as cached, find as find
+from .file_lookup import MeshName as MeshName, asset as asset, cache_folder as cache_folder
+from .file_lookup import cached as cached, find as find
 from .file_lookup import find_all as find_all, named_files as named_files
 from .rendering_packages import check_installed as check_installed, not_installed as not_installed
 from .strict_models import Colour as Colour, Count as Count, Direction as Direction, LARGEST_MM as LARGEST_MM

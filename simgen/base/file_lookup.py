@@ -90,6 +90,11 @@ def asset(folder: Path, name: str, where: str) -> Path:
     return path
 
 
+def cache_folder() -> Path:
+    """This user's folder for files that can be made anew; it need not exist."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "simgen"
+
+
 def cached(
     name: str, depends_on: Sequence[str], make: Callable[[], Any], read: Callable[[Any], Value]
 ) -> Value:
@@ -99,8 +104,7 @@ def cached(
     or ValueError of what is cached; without a cache that can be written, in each process.
     """
     key = hashlib.sha256("\n".join(depends_on).encode()).hexdigest()[:32]
-    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    path = root / "simgen" / f"{name}-{key}.json"
+    path = cache_folder() / f"{name}-{key}.json"
     with contextlib.suppress(OSError, KeyError, TypeError, ValueError):
         return read(json.loads(path.read_text()))
     values = make()

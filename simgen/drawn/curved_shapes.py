@@ -5,20 +5,34 @@ file of quads with texture coordinates, named after its content. Axes are the wo
 """
 
 import hashlib
-import io
 import math
 from pathlib import Path
 from random import Random
 
 import numpy as np
-from plyfile import PlyData, PlyElement
 
 from pcii.base.safe_files import write_bytes_safely
-from training.scenes import Table, log_uniform
+from simgen.base.file_lookup import cache_folder
+from simgen.drawn.composition import Table, log_uniform
 
 ROWS, COLUMNS = 64, 128
-FOLDER = Path(__file__).resolve().parents[1] / "out" / "training-meshes"
-"""Where the files are; those that are there are not written again."""
+HEADER = """ply
+format binary_little_endian 1.0
+element vertex {vertices}
+property float x
+property float y
+property float z
+property float s
+property float t
+element face {faces}
+property list uchar int vertex_indices
+end_header
+"""
+
+
+def mesh_folder() -> Path:
+    """Where the files are; those that are there are not written again."""
+    return cache_folder() / "meshes"
 
 
 def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
@@ -26,20 +40,16 @@ def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
     along all three."""
     rows, columns, _ = points.shape
     right, up = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
-    vertices = np.empty(rows * columns, [(name, "<f4") for name in "xyzst"])
-    for name, values in zip("xyzst", [*np.moveaxis(np.round(points, 4), -1, 0), right, up], strict=True):
-        vertices[name] = values.ravel()
+    vertices = np.concatenate([np.round(points, 4), right[..., None], up[..., None]], axis=-1).astype("<f4")
     corner = np.arange(rows * columns).reshape(rows, columns)
     quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1)
-    faces = np.empty(quads[..., 0].size, [("vertex_indices", "<i4", (4,))])
-    faces["vertex_indices"] = quads.reshape(-1, 4)
-    elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
-    content = io.BytesIO()
-    PlyData(elements, byte_order="<").write(content)
-    file = FOLDER / f"{hashlib.sha256(content.getvalue()).hexdigest()[:24]}.ply"
+    faces = np.empty(quads[..., 0].size, [("count", "u1"), ("corners", "<i4", 4)])
+    faces["count"], faces["corners"] = 4, quads.reshape(-1, 4)
+    header = HEADER.format(vertices=rows * columns, faces=faces.size).encode()
+    content = header + vertices.tobytes() + faces.tobytes()
+    file = mesh_folder() / f"{hashlib.sha256(content).hexdigest()[:24]}.ply"
     if not file.exists():
-        FOLDER.mkdir(parents=True, exist_ok=True)
-        write_bytes_safely(file, content.getvalue())
+        write_bytes_safely(file, content)
     scale = [round(size_mm, 2) for size_mm in sizes_mm]
     return {"type": "mesh", "file": file.name, "scale": scale if len(scale) > 1 else scale[0]}
 
