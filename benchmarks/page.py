@@ -4,13 +4,16 @@ import base64
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.figures import draw
 from benchmarks.machine import in_words, was_busy
 from benchmarks.results import Record, Row, Study, Value, label
 from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.tables import Table, markdown
+from pcii.figures.pages import render_page, table_markdown, text_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PICTURES = "benchmarks"
 """Folder of the figures, beside the Markdown page."""
@@ -21,7 +24,7 @@ def write_markdown(path: Path, studies: Sequence[Study], records: Sequence[Recor
     sections = [_section(study, record) for study, record in _pairs(studies, records)]
     for study, record in _pairs(studies, records):
         draw(study, record.measured, path.parent / PICTURES / f"{study.name}.png")
-    text = _rendered("benchmarks.md.j2", sections=sections, pictures=PICTURES)
+    text = _markdown(sections=sections, pictures=PICTURES)
     write_bytes_safely(path, text.encode())
 
 
@@ -31,12 +34,13 @@ def write_html(path: Path, studies: Sequence[Study], records: Sequence[Record]) 
     for section in sections:
         picture = (path.parent / f"{section['name']}.png").read_bytes()
         section["picture"] = "data:image/png;base64," + base64.b64encode(picture).decode()
-    write_bytes_safely(path, _rendered("benchmarks.html.j2", sections=sections, script=None).encode())
+    page = render_page("benchmarks.html.j2", {"sections": sections}, package="benchmarks")
+    write_bytes_safely(path, page)
 
 
-def tables_of(rows: Sequence[Row]) -> list[Table]:
-    """The tables of a study, with a column for each parameter and quantity that any of its rows has."""
-    found: list[Table] = []
+def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
+    """The tables of a study by title, with a column for each parameter and quantity that any row has."""
+    tables: dict[str, DataFrame] = {}
     for title in dict.fromkeys(row.table for row in rows):
         own = [row for row in rows if row.table == title]
         parameters = list(dict.fromkeys(name for row in own for name in row.parameters))
@@ -49,8 +53,8 @@ def tables_of(rows: Sequence[Row]) -> list[Table]:
             )
             for row in own
         ]
-        found.append(Table(title, ("what", *map(label, (*parameters, *quantities))), tuple(cells)))
-    return found
+        tables[title] = text_table(cells, ("what", *map(label, (*parameters, *quantities))))
+    return tables
 
 
 def told(value: Value | None) -> str:
@@ -88,12 +92,12 @@ def _section(study: Study, record: Record) -> dict[str, Any]:
     machine = record.machine
     tables = tables_of(record.measured.rows)
     if record.measured.ratios:
-        tables.append(_ratios(record))
+        tables["Ratios"] = _ratios(record)
     return {
         "name": study.name,
         "title": study.title,
         "reading": study.reading(record.measured),
-        "tables": [{"table": table, "markdown": markdown(table)} for table in tables],
+        "tables": {title: (table, table_markdown(table)) for title, table in tables.items()},
         "size": record.size,
         "date": date.fromisoformat(record.date[:10]).isoformat(),
         "wall_s": round(record.wall_s),
@@ -105,7 +109,7 @@ def _section(study: Study, record: Record) -> dict[str, Any]:
     }
 
 
-def _ratios(record: Record) -> Table:
+def _ratios(record: Record) -> "DataFrame":
     rows = [
         (
             ratio.name,
@@ -116,18 +120,17 @@ def _ratios(record: Record) -> Table:
         for ratio in record.measured.ratios
     ]
     header = ("how many times better, side by side", "ratio", "asked for", "met")
-    return Table("Ratios", header, tuple(rows))
+    return text_table(rows, header)
 
 
-def _rendered(template: str, **content: Any) -> str:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+def _markdown(**content: Any) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader("benchmarks"), PackageLoader("pcii.evaluation")]),
-        autoescape=template.endswith(".html.j2"),
+        loader=PackageLoader("benchmarks"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template(template).render(content)
+    return environment.get_template("benchmarks.md.j2").render(content)

@@ -17,7 +17,8 @@ import pcii
 import simgen
 from pcii.depth.methods import depth_posterior
 from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
-from pcii.evaluation.tables import NOT_BETTER, Table, markdown
+from pcii.evaluation.tables import NOT_BETTER
+from pcii.figures.pages import table_markdown, text_table
 from pcii.imaging.blocks import on_pixels
 from pcii.removal.posterior_masks import masks_of
 from pcii.types.geometry import total_disparity_px
@@ -313,7 +314,7 @@ def page(rows: Mapping[Key, Row]) -> str:
         return "–" if np.isnan(value) else f"{value:.2f}{mark}"
 
     def table(header: tuple[str, ...], lines: Iterator[tuple[str, ...]], words: int = 1) -> str:
-        return markdown(Table("", header, tuple(lines), words=words))
+        return table_markdown(text_table(lines, header, words))
 
     def depth_table(scene: str) -> str:
         light = SCENES[scene].photons

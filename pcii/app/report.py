@@ -1,7 +1,7 @@
 """report.html: a slider through the depths, pictures of each plane, depth, scores, and how it was made.
 
 A single file that fetches nothing, which can be mailed, archived and printed. Its pictures and text need no
-script; the slider is by the one in `pcii/evaluation/templates/report.js`.
+script; the slider is by the one in `pcii/figures/templates/report.js`.
 """
 
 import json
@@ -13,7 +13,7 @@ from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane
 from pcii.app.report_tables import depth_table, entropy_table, score_table
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.method_names import NamedMethod, depth_name, software_of
-from pcii.evaluation.pages import page
+from pcii.figures.pages import render_page, text_table
 from pcii.store.software import machine
 
 COARSE_PX = 320
@@ -44,13 +44,13 @@ def write_report(path: Path, outcome: Outcome) -> None:
         "depth_table": depth_table(outcome),
         "entropies": entropy_table(outcome),
         "scores": score_table(outcome),
-        "origin": origin(outcome),
+        "origin": text_table(_origin(outcome), ("what", "value"), words=2),
         "recipe": json.dumps(dataset.manifest.get("recipe"), indent=1, ensure_ascii=False).splitlines(),
     }
-    write_bytes_safely(path, page("report.html.j2", content, script="report.js"))
+    write_bytes_safely(path, render_page("report.html.j2", content, script="report.js"))
 
 
-def origin(outcome: Outcome) -> list[tuple[str, str]]:
+def _origin(outcome: Outcome) -> list[tuple[str, str]]:
     """How the report and its dataset were made: names and values, folders by their names alone."""
     manifest = outcome.dataset.manifest
     methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))

@@ -4,15 +4,19 @@ A column or row of which nothing is known is left out.
 """
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
-from pcii.evaluation.tables import Table
+from pcii.figures.pages import NOT_KNOWN, emphasised, text_table
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.truth import Truth
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 NUMBERS = {
     "iou": "IoU",
@@ -31,7 +35,7 @@ NUMBERS = {
 """Columns of the scores after those that say what is scored."""
 
 
-def entropy_table(outcome: Outcome) -> Table:
+def entropy_table(outcome: Outcome) -> "DataFrame":
     """Entropies of the objects at each plane with their intervals (the paper's Table 1).
 
     The lowest of a row stands out. There are no intervals of too few photons, nor of radiance.
@@ -41,21 +45,19 @@ def entropy_table(outcome: Outcome) -> Table:
     if objects and dataset.has_counts and dataset.truth is not None:
         half_widths = entropy_half_widths(dataset.counts, outcome.sections, dataset.truth)
     rows: list[tuple[str, ...]] = []
-    best: set[tuple[int, int]] = set()
     for row, half in zip(objects, half_widths or [{}] * len(objects), strict=True):
         entropy = row["entropy"]
         if None in entropy.values():
             continue
+        texts = {z: f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else "") for z, bits in entropy.items()}
         if len(entropy) > 1:
             lowest = min(entropy.values())
-            best |= {(len(rows), 1 + place) for place, z in enumerate(entropy) if entropy[z] == lowest}
-        cells = (f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else "") for z, bits in entropy.items())
-        rows.append((row["name"], *cells))
-    header = ("object", *(f"{z:g} mm" for z in outcome.sections.z_mm))
-    return Table("Entropy of the objects, in bits", header, tuple(rows), best=frozenset(best))
+            texts |= {z: emphasised(texts[z]) for z, bits in entropy.items() if bits == lowest}
+        rows.append((row["name"], *texts.values()))
+    return text_table(rows, ("object", *(f"{z:g} mm" for z in outcome.sections.z_mm)))
 
 
-def score_table(outcome: Outcome) -> Table:
+def score_table(outcome: Outcome) -> "DataFrame":
     """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
     rows = [{**row, "everything": row["everything"]["iou"]} for row in outcome.score.planes]
     words = ["plane", "method", "truth", "objects"]
@@ -69,9 +71,9 @@ def score_table(outcome: Outcome) -> Table:
     for row in rows:
         objects = "all in focus" if row["truth"] == "pixel" else row["object"] or "none at this plane"
         texts = [f"{row['z_mm']:g} mm", row["method"], row["truth"], objects][: len(words)]
-        cells.append((*texts, *("–" if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
+        cells.append((*texts, *(NOT_KNOWN if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
     header = (*words, *(NUMBERS[key] for key in numbers))
-    return Table("Scores of the masks", header, tuple(cells), words=len(words))
+    return text_table(cells, header, words=len(words))
 
 
 def result_tables(outcome: Outcome) -> Iterator[str]:
@@ -86,7 +88,7 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
         columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or other}" for row in rows}
         iou = pd.DataFrame(rows).pivot(index="method", columns="z_mm", values="iou")
         iou.index.name = iou.columns.name = None
-        shown = iou.rename(columns=columns).to_string(float_format="{:.3f}".format, na_rep="–")
+        shown = iou.rename(columns=columns).to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
         yield f"IoU of the masks\n{shown}"
     depth = outcome.score.depth
     if depth["within_1px"] is not None:
@@ -120,7 +122,7 @@ def _pixels_of_depth(truth: Truth | None) -> str:
     )
 
 
-def depth_table(outcome: Outcome) -> Table:
+def depth_table(outcome: Outcome) -> "DataFrame":
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
     rows: list[tuple[str, str]] = []
@@ -146,4 +148,4 @@ def depth_table(outcome: Outcome) -> Table:
         if row["depth_sigma_px"] is not None:
             bound = f"{row['depth_sigma_px']:.3f} px of total disparity"
             rows.append((f"Cramér-Rao bound on the standard deviation for {row['name']}", bound))
-    return Table("Errors of the depth map", ("measure", "value"), tuple(rows), words=2)
+    return text_table(rows, ("measure", "value"), words=2)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
-from pcii.evaluation.curves import accuracy_plot
+from pcii.evaluation.evaluation_page import ABOUT_YARDSTICKS, accuracy_plot
 from pcii.evaluation.method_names import estimator_of, known_methods
-from pcii.evaluation.pages import ABOUT_YARDSTICKS, page
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import (
@@ -23,7 +22,8 @@ from pcii.evaluation.summary import (
     ranks,
     with_yardsticks,
 )
-from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
+from pcii.evaluation.tables import TITLES, light_name, mean_table, rank_table
+from pcii.figures.pages import NOT_KNOWN, render_page, text_table
 from pcii.store.collection import IN_FRAMES
 from pcii.store.folders import ROWS
 from pcii.store.verification import verify_scores
@@ -135,16 +135,16 @@ def write_page(folder: Path, out: Path) -> int:
         "half": first.half,
         "yardsticks": ABOUT_YARDSTICKS,
         "scenes": of_scenes["scene"].nunique(),
-        "kinds": [
+        "comparisons": [
             _compare(comparison, of_cells)
             for comparison in COMPARISONS
             if comparison.measure in set(of_cells["measure"])
         ],
-        "ranks": [_ranks(of_scenes, measure, title) for measure, title in TITLES.items()],
+        "ranks": dict(_ranks(of_scenes, measure) for measure in TITLES),
         "machines": _machines(rows),
         "submissions": _submission_table(submissions, frame),
     }
-    write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
+    write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
 
 
@@ -165,26 +165,16 @@ def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
     columns = [*map(light_name, accuracy["light"].unique()), *times["column"].unique()]
     by_light["column"] = pd.Categorical(by_light["column"], columns)
     at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
-    return {
-        "title": comparison.title,
-        "words": comparison.words,
-        "plot": accuracy_plot(over_scenes, list(values["method"].cat.categories), measure),
-        "table": mean_table(
-            "By photons per view",
-            by_light,
-            ["method"],
-            "column",
-            full_n=of_scenes["scene"].nunique(),
-            bound=comparison.bound,
-        ),
-        "by_scene": mean_table(
-            f"By scene, at {TYPICAL_PHOTONS:g} photons per view",
-            at_typical,
-            ["scene"],
-            "method",
-            bound=comparison.bound,
-        ),
-    }
+    tables: dict[str, DataFrame] = {}
+    scenes, bound = of_scenes["scene"].nunique(), comparison.bound
+    if len(by_light):
+        title = "By photons per view"
+        tables[title] = mean_table(by_light, ["method"], "column", full_n=scenes, bound=bound)
+    if len(at_typical):
+        title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
+        tables[title] = mean_table(at_typical, ["scene"], "method", bound=bound)
+    chart = accuracy_plot(over_scenes, list(values["method"].cat.categories), measure)
+    return {"title": comparison.title, "words": comparison.words, "chart": chart, "tables": tables}
 
 
 def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
@@ -206,9 +196,9 @@ def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
     return values.assign(method=pd.Categorical(values["method"], methods))
 
 
-def _ranks(frame: "DataFrame", measure: str, title: str) -> Table:
+def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
     unit = ranked_over(frame, measure)
-    return rank_table(ranks(frame, measure), f"{title} over all {unit}", unit)
+    return f"{TITLES[measure]} over all {unit}", rank_table(ranks(frame, measure), unit)
 
 
 def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
@@ -221,7 +211,7 @@ def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
     return {machine: sorted(names) for machine, names in sorted(methods.items()) if machine}
 
 
-def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> Table:
+def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> "DataFrame":
     """Whose each method is, and the command that measures it again, in a folder of its own."""
     scores = frame.drop_duplicates(["method", "identity", "light"])["method"].value_counts()
     rows = []
@@ -234,15 +224,7 @@ def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "Data
             is_known = name in known_methods() or ":" in (estimator_of(name) or name)
             if about.is_run and not is_known:
                 command = "no method of this name is installed"
-            rows.append(
-                (
-                    method,
-                    about.authors or "–",
-                    about.url or "–",
-                    about.trained_on or "–",
-                    str(scores[method]),
-                    command,
-                )
-            )
+            texts = (text or NOT_KNOWN for text in (about.authors, about.url, about.trained_on))
+            rows.append((method, *texts, str(scores[method]), command))
     header = ("method", "authors", "url", "trained on", "scores", "command")
-    return Table("Submissions", header, tuple(sorted(rows)), words=4)
+    return text_table(sorted(rows), header, words=4)

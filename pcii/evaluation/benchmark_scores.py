@@ -13,9 +13,9 @@ from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.comparison import Evaluation
+from pcii.evaluation.evaluation_page import write_evaluation
 from pcii.evaluation.measurement import EvaluationJob, measure
 from pcii.evaluation.method_names import named_method
-from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
 from pcii.evaluation.submissions import (
     RUN,

@@ -10,10 +10,9 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.evaluation import summary
-from pcii.evaluation.curves import draw_evaluation
+from pcii.evaluation.evaluation_page import draw_evaluation, write_evaluation
 from pcii.evaluation.measurement import EvaluationJob, measure
 from pcii.evaluation.method_names import Method, named_methods
-from pcii.evaluation.pages import write_evaluation
 from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
 from pcii.evaluation.tasks import tasks_of
 from pcii.store.collection import is_collection, read_index

@@ -3,6 +3,8 @@ from .charts import draw_accuracy as draw_accuracy, known_places as known_places
 from .exposure import block_px as block_px, encoded as encoded, exposed as exposed
 from .exposure import filled_means as filled_means, image_block_sums as image_block_sums
 from .exposure import photon_picture as photon_picture, smoothed as smoothed, smoothing_for as smoothing_for
+from .pages import NOT_KNOWN as NOT_KNOWN, emphasised as emphasised, render_page as render_page
+from .pages import table_markdown as table_markdown, text_table as text_table
 from .panels import colour_bar_uri as colour_bar_uri, figure_bytes as figure_bytes, figure_uri as figure_uri
 from .panels import hide_frame as hide_frame, in_style as in_style, new_figure as new_figure
 from .panels import several_axes as several_axes

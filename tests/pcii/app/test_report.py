@@ -114,7 +114,7 @@ def test_errors_of_depth_and_their_scale() -> None:
 
 
 def test_tables_can_be_scrolled_by_keyboard_and_pictures_have_words(page: str) -> None:
-    tables = re.findall(r"<div class=\"wide\"([^>]*)>\s*<table", page)
+    tables = re.findall(r"<div class=\"wide ([^>]*)>\s*<table", page)
     assert len(tables) == page.count("<table")
     assert all('tabindex="0"' in each and "aria-label" in each for each in tables)
     pictures = re.findall(r"<img [^>]*>", page)

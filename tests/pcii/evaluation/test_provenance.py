@@ -18,7 +18,7 @@ from pcii.evaluation.rows import writing_rows
 from pcii.store import machine, own_software
 
 COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
-DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}
+DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed", "lazy-loader"}
 CODE = """
 from pcii import DepthMap, Segmented
 from pathlib import Path
