@@ -17,9 +17,9 @@ import pcii
 from pcii.base.progress import Stages
 from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
 from pcii.evaluation.comparison import find_datasets
+from pcii.evaluation.measurement import tasks_of
 from pcii.evaluation.method_names import NamedMethod
 from pcii.evaluation.tables import light_name
-from pcii.evaluation.tasks import tasks_of
 from pcii.figures.pages import table_markdown, text_table
 from pcii.removal.posterior_masks import masks_of
 from pcii.store.suggested_depths import depth_range_of, planes_of

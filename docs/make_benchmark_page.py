@@ -17,7 +17,8 @@ from matplotlib import pyplot as plt
 
 from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.rows import frame_of, read_rows
+from pcii.evaluation.frames import frame_of
+from pcii.evaluation.rows import read_rows
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.evaluation.summary import lines_of, means, with_yardsticks
 from pcii.evaluation.tables import with_interval

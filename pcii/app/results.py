@@ -32,7 +32,7 @@ from pcii.base.safe_files import (
     write_json_safely,
 )
 from pcii.depth.methods import DEFAULT_METHOD
-from pcii.evaluation.rows import identity_of
+from pcii.evaluation.measurement import identity_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.store.folders import (

@@ -28,8 +28,8 @@ from pydantic import (
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import is_plain, web_address
+from pcii.evaluation.measurement import Task
 from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of
-from pcii.evaluation.tasks import Task
 from pcii.store.collection import Half
 from pcii.store.dataset import Dataset
 from pcii.store.manifests import first_fault

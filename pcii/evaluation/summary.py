@@ -1,6 +1,6 @@
 """Means of an evaluation with their intervals, and comparisons of methods on the same datasets.
 
-All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
+All are of `Evaluation.frame` (see `pcii.evaluation.frames`). Datasets that differ in seed and amount of light
 alone are one scene.
 """
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.evaluation.rows import HEAD, NO_MEASURES
+from pcii.evaluation.rows import HEAD
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -159,7 +159,7 @@ def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
     import pandas as pd
 
     keys = [*by, "seed", "identity"]
-    measures = [column for column in frame.columns if column not in NO_MEASURES]
+    measures = [column for column in frame.columns if column not in HEAD]
     values = frame[[*keys, *measures]].groupby(keys, observed=True, dropna=False).mean()
     parts = [
         _group_means(values[measure], by, kind_of(measure), measure)
