@@ -15,14 +15,13 @@ from pcii.app.command_options import (
     dataset_at,
 )
 from pcii.app.pipeline import full_light_sections
-from pcii.app.report_pictures import block_estimates
 from pcii.app.report_tables import result_tables, right_share
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_surfaces
-from pcii.figures.exposure import encoded
+from pcii.figures.exposure import exposed
 from pcii.figures.panels import figure_bytes, new_figure
 from pcii.figures.pictures import mask_image, write_png
 from pcii.figures.plots import draw_depth
@@ -121,7 +120,8 @@ def reconstruct(
     with results.writing(out, data) as folder:
         sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
         results.save_sections(folder, sections)
-        for z, picture in zip(sections.z_mm, encoded(block_estimates(sections, 1)), strict=True):
+        pictures = exposed(zip(sections.counts, sections.coverage, strict=True), 1)
+        for z, picture in zip(sections.z_mm, pictures, strict=True):
             write_png(folder / f"section_{z:g}mm.png", picture)
     say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
     saturated = int(np.count_nonzero(np.isinf(sections.estimate)))

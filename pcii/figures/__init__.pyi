@@ -1,7 +1,7 @@
 from .charts import PLACES as PLACES, accuracy_chart as accuracy_chart, calibration_chart as calibration_chart
 from .charts import draw_accuracy as draw_accuracy, known_places as known_places
-from .exposure import block_px as block_px, encoded as encoded, exposed as exposed
-from .exposure import filled_means as filled_means, image_block_sums as image_block_sums
+from .exposure import block_px as block_px, exposed as exposed
+from .exposure import filled_means as filled_means
 from .exposure import photon_picture as photon_picture, smoothed as smoothed, smoothing_for as smoothing_for
 from .pages import NOT_KNOWN as NOT_KNOWN, emphasised as emphasised, render_page as render_page
 from .pages import table_markdown as table_markdown, text_table as text_table

@@ -24,7 +24,7 @@ def block_px(shape: Sequence[int], longest_px: int) -> int:
     return -(-max(shape[0], shape[1], 1) // longest_px)
 
 
-def image_block_sums(image: np.ndarray, step_px: int) -> np.ndarray:
+def _image_block_sums(image: np.ndarray, step_px: int) -> np.ndarray:
     """Sums over blocks of an image (H, W, C), as int64 or float64; infinite ones are no error."""
     with np.errstate(over="ignore", invalid="ignore"):
         return block_sums(image, step_px, np.float64 if image.dtype.kind == "f" else np.int64, (0, 1))
@@ -40,7 +40,7 @@ def smoothing_for(sections: Sequence[np.ndarray]) -> float:
     (2.5, 0.0)
     """
     squares = np.concatenate(
-        [image_block_sums(counts, DENSITY_PX).sum(axis=-1).ravel() for counts in sections]
+        [_image_block_sums(counts, DENSITY_PX).sum(axis=-1).ravel() for counts in sections]
     )
     lit = squares[squares > 0].astype(np.float64)
     if not lit.size:
@@ -80,25 +80,25 @@ def filled_means(sums: np.ndarray, samples: np.ndarray) -> np.ndarray:
         return np.divide(sums, samples, out=means, where=samples > 0)
 
 
-def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """8-bit pictures of block estimates with their samples, all at the same exposure."""
-    white = max(white_level(estimate, samples) for estimate, samples in blocks)
-    return [to_srgb8(estimate, white) for estimate, _ in blocks]
-
-
-def exposed(images: Iterable[tuple[np.ndarray, np.ndarray]], step_px: int) -> list[np.ndarray]:
+def exposed(
+    images: Iterable[tuple[np.ndarray, np.ndarray]], step_px: int, smoothing_px: float = 0.0
+) -> list[np.ndarray]:
     """8-bit pictures of images, each given by sums and numbers of samples (H, W, C), at the same exposure.
 
-    They are shown in blocks of `step_px` x `step_px` pixels.
+    They are shown in blocks of `step_px` x `step_px` pixels, smoothed by a Gaussian with a standard deviation
+    of `smoothing_px` pixels.
     """
     blocks: list[tuple[np.ndarray, np.ndarray]] = []
-    for sums, samples in images:
-        sums, samples = image_block_sums(sums, step_px), image_block_sums(samples, step_px)
+    for image in images:
+        sums, samples = (_image_block_sums(values, step_px) for values in image)
+        if smoothing_px:
+            sums, samples = smoothed(sums, samples, smoothing_px / step_px)
         blocks.append((filled_means(sums, samples), samples))
-    return encoded(blocks)
+    white = max(white_level(*block) for block in blocks)
+    return [to_srgb8(means, white) for means, _ in blocks]
 
 
 def photon_picture(counts: np.ndarray, step_px: int) -> np.ndarray:
     """8-bit picture of the photon counts (H, W) of one view: the photons in blocks, one or more are white."""
-    sums = image_block_sums(counts[..., None], step_px)
+    sums = _image_block_sums(counts[..., None], step_px)
     return to_srgb8(sums, max(1.0, white_level(sums)))

@@ -100,11 +100,11 @@ def new_figure(width_in: float, height_in: float, layout: Literal["compressed", 
     return figure
 
 
-def figure_bytes(figure: "Figure") -> bytes:
-    """A figure as PNG."""
-    stored = io.BytesIO()
-    figure.savefig(stored, format="png")
-    return stored.getvalue()
+def figure_bytes(figure: "Figure", dots_per_inch: float | Literal["figure"] = "figure") -> bytes:
+    """A figure as PNG, by default with the dots per inch that it was made for."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots_per_inch)
+    return buffer.getvalue()
 
 
 def figure_uri(figure: "Figure") -> str:

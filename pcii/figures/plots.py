@@ -5,8 +5,6 @@ Matplotlib `axes` that it gets, by default of a new figure, and returns them as 
 panel.
 """
 
-import base64
-import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +19,7 @@ from pcii.figures.panels import (
     colour_scale,
     draw_outline,
     draw_scale_bar,
+    figure_bytes,
     hide_frame,
     in_style,
     plot_label,
@@ -28,7 +27,7 @@ from pcii.figures.panels import (
     show_picture,
     write_in_middle,
 )
-from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image
+from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image, uri_of
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
@@ -74,14 +73,14 @@ def picture_html(value: Any) -> str:
     """The line of a value and its drawing, in HTML; without a picture if its data cannot be read."""
     from matplotlib import pyplot
 
-    line, png = f"<pre>{in_html(repr(value))}</pre>", io.BytesIO()
+    line = f"<pre>{in_html(repr(value))}</pre>"
     try:
         figure = draw(value)[0].figure
     except (InputError, OSError):
         return line
-    figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
+    picture = uri_of("png", figure_bytes(figure, PICTURE_DOTS_PER_INCH))
     pyplot.close(figure)
-    return f'{line}<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
+    return f'{line}<img src="{picture}">'
 
 
 def draw_counts(counts: Any, axes: Any, view: Any = None) -> np.ndarray:

@@ -10,7 +10,8 @@ import pytest
 from report_outcomes import COUNTS, FOUND, GRID, IDS, TRUTH, Written, outcome_of, page_of
 
 from pcii.app import Outcome
-from pcii.app.report_pictures import MAX_SLIDER_PLANES, block_estimates, depth_errors, slider_planes
+from pcii.app.report_pictures import MAX_SLIDER_PLANES, depth_errors, slider_planes
+from pcii.figures import exposed
 from pcii.sections import reconstruct
 from pcii.types import CameraGrid, PhotonCounts, Truth, total_disparity_px
 
@@ -102,8 +103,9 @@ def test_colours_without_samples_are_those_around() -> None:
     sections = reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid, cfa="GRBG"), 2500)
     assert (sections.coverage[0, 6:10, 6:10] == 0).any()
     for step in (1, 2, 3):
-        ((estimate, _),) = block_estimates(sections, step)
-        np.testing.assert_allclose(estimate[3:-3, 3:-3] if step == 1 else estimate[2:-2, 2:-2], 1)
+        (image,) = exposed([(sections.counts[0], sections.coverage[0])], step)
+        inside = 3 if step == 1 else 2
+        np.testing.assert_array_equal(image[inside:-inside, inside:-inside], 255)
 
 
 def test_errors_of_depth_and_their_scale() -> None:
