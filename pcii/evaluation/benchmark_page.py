@@ -130,16 +130,16 @@ def write_page(folder: Path, out: Path) -> int:
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
     first = next(iter(submissions.values()))
-    of_cells = means(frame)
+    cell_means = means(frame)
     content = {
         "benchmark": first.benchmark,
         "half": first.half,
         "yardsticks": ABOUT_YARDSTICKS,
         "scenes": of_scenes["scene"].nunique(),
         "comparisons": [
-            _compare(comparison, of_cells)
+            _compare(comparison, cell_means)
             for comparison in COMPARISONS
-            if comparison.measure in set(of_cells["measure"])
+            if comparison.measure in set(cell_means["measure"])
         ],
         "ranks": dict(_ranks(of_scenes, measure) for measure in TITLES),
         "machines": _machines(rows),
@@ -149,12 +149,12 @@ def write_page(folder: Path, out: Path) -> int:
     return len(submissions)
 
 
-def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
+def _compare(comparison: Comparison, cell_means: "DataFrame") -> dict[str, Any]:
     """What the page says of methods by one measure, from the means of `summary.means`."""
     import pandas as pd
 
     measure = comparison.measure
-    values = _values(comparison, of_cells)
+    values = _values(comparison, cell_means)
     of_scenes = values[~values["scene"].astype(str).str.endswith(IN_FRAMES)]
     is_geometric = of_scenes["measure"].isin(list(GEOMETRIC))
     of_scenes = of_scenes.assign(mean=of_scenes["mean"].mask(is_geometric, of_scenes["mean"].clip(MIN_PX)))
@@ -178,12 +178,12 @@ def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
     return {"title": comparison.title, "words": comparison.words, "chart": chart, "tables": tables}
 
 
-def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
+def _values(comparison: Comparison, cell_means: "DataFrame") -> "DataFrame":
     """Means of the measure, photons and seconds of the methods that have it, the bound as the last method."""
     import pandas as pd
 
     def of(*measures: str) -> "DataFrame":
-        return of_cells[of_cells["measure"].isin(measures)]
+        return cell_means[cell_means["measure"].isin(measures)]
 
     has_measure = of(comparison.measure)[["scene", "light", "method"]]
     values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)

@@ -10,11 +10,13 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.evaluation import summary
-from pcii.evaluation.evaluation_page import draw_evaluation, write_evaluation
+from pcii.evaluation.evaluation_page import AXES, ERRORS, accuracies, write_evaluation
 from pcii.evaluation.frames import frame_of
 from pcii.evaluation.measurement import EvaluationJob, measure, tasks_of
 from pcii.evaluation.method_names import Method, named_methods
 from pcii.evaluation.rows import key_of, origin_of, writing_rows
+from pcii.figures.charts import draw_accuracy, known_places
+from pcii.figures.panels import in_style, several_axes
 from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH
@@ -44,7 +46,7 @@ class Evaluation:
     def means(self, by: Sequence[str] = summary.CELL) -> "DataFrame":
         """Means of every measure over datasets, with their 95 % intervals: see `summary.means`.
 
-        Beside methods they are of what looks at no photon: see `summary.YARDSTICKS`.
+        Methods are joined by yardsticks, which look at no photon: see `summary.YARDSTICKS`.
         """
         return summary.means(summary.with_yardsticks(self.frame), by)
 
@@ -64,7 +66,16 @@ class Evaluation:
         `evaluation.plot("iou", style="paper")[0].figure.savefig("iou.pdf")`, or .svg. Raises `InputError` for
         another measure or style, one that no method has, and axes that are none, or another number of them.
         """
-        return draw_evaluation(self.means(), measure, axes, style=style)
+        if measure not in AXES:
+            raise InputError(f"measure: expected one of {', '.join(AXES)}, got {measure!r}")
+        cells = accuracies(summary.over_scenes(self.means()), measure)
+        if not (places := known_places(cells)):
+            raise InputError(f"measure: no method has {measure!r}")
+        methods = sorted(cells["method"].unique())
+        with in_style(style):
+            panels = several_axes(axes, len(places))
+            draw_accuracy(panels, cells, methods, AXES[measure], is_share=measure not in ERRORS)
+        return panels
 
 
 def evaluate(

@@ -7,15 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from pcii.base.errors import InputError
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.summary import means, over_scenes, with_yardsticks
 from pcii.evaluation.tables import NOT_BETTER, TITLES, light_name, tables_of
-from pcii.figures.charts import PLACES, accuracy_chart, calibration_chart, draw_accuracy, known_places
+from pcii.figures.charts import PLACES, accuracy_chart, calibration_chart
 from pcii.figures.pages import render_page, text_table
-from pcii.figures.panels import figure_uri, in_style, several_axes
+from pcii.figures.panels import figure_uri
 from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
 
 if TYPE_CHECKING:
@@ -68,19 +65,19 @@ def write_evaluation(
     """
     sweep_temporaries(out)
     frame = with_yardsticks(frame)
-    of_cells = means(frame)
+    cell_means = means(frame)
     differing = ", ".join(origin["differing"])
     warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
     content = {
         "warnings": [warning] if differing else [],
         "notes": NOTES,
-        "charts": {words: chart for words, chart in _charts(over_scenes(of_cells)) if chart},
-        "tables": dict(tables_of(frame, of_cells)),
+        "charts": {words: chart for words, chart in _charts(over_scenes(cell_means)) if chart},
+        "tables": dict(tables_of(frame, cell_means)),
         "origin": _origin_table(origin, hash_file(out / ROWS)),
     }
     files = {
         "evaluation.html": render_page("evaluation.html.j2", content),
-        "means.csv": of_cells.to_csv(index=False).encode(),
+        "means.csv": cell_means.to_csv(index=False).encode(),
     }
     for name, text in files.items():
         write_bytes_safely(out / name, text)
@@ -119,34 +116,13 @@ def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> s
 
     `table` has means by method, light and measure. Empty if no method has the measure.
     """
-    cells = _accuracies(table, measure)
+    cells = accuracies(table, measure)
     figure = accuracy_chart(cells, methods, AXES[measure], is_share=measure not in ERRORS)
     return "" if figure is None else figure_uri(figure)
 
 
-def draw_evaluation(
-    of_cells: "DataFrame", measure: str, axes: Any = None, *, style: str = "screen"
-) -> np.ndarray:
-    """Draw one of `AXES` against photons per view, and against seconds, into Matplotlib axes (N,).
-
-    `of_cells` are means by scene, light and method. Without `axes` they are new ones. The style "paper", for
-    print, has a white background whatever style is in use. Raises `InputError` for a measure or style that is
-    not there, and for a measure of which nothing is known.
-    """
-    if measure not in AXES:
-        raise InputError(f"measure: expected one of {', '.join(AXES)}, got {measure!r}")
-    cells = _accuracies(over_scenes(of_cells), measure)
-    if not (places := known_places(cells)):
-        raise InputError(f"measure: no method has {measure!r}")
-    methods = sorted(cells["method"].unique())
-    with in_style(style):
-        panels = several_axes(axes, len(places))
-        draw_accuracy(panels, cells, methods, AXES[measure], is_share=measure not in ERRORS)
-    return panels
-
-
-def _accuracies(table: "DataFrame", measure: str) -> "DataFrame":
-    """The means of a measure by method and light, with those of photons per view and seconds."""
+def accuracies(table: "DataFrame", measure: str) -> "DataFrame":
+    """The means of a measure by method and light, with those of photons per view and of seconds."""
     cells = table[table["measure"] == measure].set_index(["method", "light"])[["n", "mean", "low", "high"]]
     cells = cells.assign(**{end: cells[end].fillna(cells["mean"]) for end in ("low", "high")})
     for name in PLACES:

@@ -80,19 +80,19 @@ def tasks_of(
             )
         if dataset.grid.view_count < 2:
             raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
-        known = [dataset.at_light(light).light for light in lights] or dataset.lights
-        if not known:
+        lights_of_dataset = [dataset.at_light(light).light for light in lights] or dataset.lights
+        if not lights_of_dataset:
             raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
-        own = [
+        tasks_of_dataset = [
             Task(dataset, light, method, tuple(map(float, z_mm)))
-            for light in dict.fromkeys(known)
+            for light in dict.fromkeys(lights_of_dataset)
             for method in methods or _methods_for(dataset, light, z_mm)
             if method.takes(full_light=light == FULL_LIGHT)
         ]
-        _check_methods(dataset, methods, own)
-        _check_depths(dataset, own, z_mm)
-        tasks.setdefault(identity_of(dataset.manifest), own)
-    return [task for own in tasks.values() for task in own]
+        _check_methods(dataset, methods, tasks_of_dataset)
+        _check_depths(dataset, tasks_of_dataset, z_mm)
+        tasks.setdefault(identity_of(dataset.manifest), tasks_of_dataset)
+    return [task for tasks_of_dataset in tasks.values() for task in tasks_of_dataset]
 
 
 def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[NamedMethod]:
@@ -103,14 +103,14 @@ def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[
 
 
 def _check_methods(dataset: Dataset, methods: Sequence[NamedMethod], tasks: Sequence[Task]) -> None:
-    used = {task.method.name for task in tasks}
+    names = {task.method.name for task in tasks}
     for method in methods:
-        if method.name not in used:
-            kinds = ("photon counts", "radiance")
-            needed, there = kinds if method.takes(full_light=False) else kinds[::-1]
+        if method.name not in names:
+            takes_counts = method.takes(full_light=False)
+            need, offer = ("photon counts", "radiance") if takes_counts else ("radiance", "photon counts")
             raise InputError(
-                f"method: {method.name!r} needs {needed}, and of {dataset.path} {there} would be scored; use "
-                f"{', '.join(methods_for(full_light=there == 'radiance'))}"
+                f"method: {method.name!r} needs {need}, and of {dataset.path} {offer} would be scored; use "
+                f"{', '.join(methods_for(full_light=takes_counts))}"
             )
 
 
@@ -191,7 +191,7 @@ class EvaluationJob:
         self.tasks = tasks
         self._warm: set[tuple[Light, str]] = set()
         self._software: dict[str, Mapping[str, str] | None] = {}
-        self._lit_sections: tuple[str, Sections] | None = None
+        self._full_light_sections: tuple[str, Sections] | None = None
         """Identity of the last dataset with bounds, and the sections of its radiance."""
 
     def __call__(self, piece: int) -> Row:
@@ -201,11 +201,11 @@ class EvaluationJob:
         if name not in self._software:  # that of this process, which may be on another machine
             self._software[name] = software_of(task.method)
         data = task.data
-        seen, truth = data.counts_or_views, data.truth
+        images, truth = data.counts_or_views, data.truth
         seconds, estimate = self.estimate(task, data)
         row = _dataset_fields(data, task.z_mm) | {
             "budget": task.light.stored,
-            "photons_per_view": seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None,
+            "photons_per_view": data.counts.total / data.grid.view_count if data.has_counts else None,
             "method": name,
             "seconds": None if seconds is None else round(seconds, 6),
             "software": self._software[name],
@@ -214,7 +214,7 @@ class EvaluationJob:
         }
         if isinstance(estimate, DepthMap):
             depth = dict(score(None, estimate, truth, grid=data.grid).depth)
-            return row | {"depth": depth} | self._bound(task, data, seen)
+            return row | {"depth": depth} | self._bound(task, data, images)
         result = score(estimate, None, truth)
         planes = [
             {name: value for name, value in plane.items() if name != "method"} for plane in result.planes
@@ -223,18 +223,18 @@ class EvaluationJob:
 
     def estimate(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
         """Seconds and result of a task on its `data`; the first call of a method at a light is a warm-up."""
-        estimator, seen = estimator_of(task.method.name), data.counts_or_views
+        estimator, images = estimator_of(task.method.name), data.counts_or_views
 
         def work() -> Any:
             z_range_mm = depth_range_of(data, task.z_mm)
             if estimator is not None:
                 method = task.method.function or estimator
                 planes = planes_of(data, task.z_mm) if has_depths(data, task.z_mm) else None
-                return estimate_depth(seen, z_range_mm, z_mm=planes, method=method)
-            assert isinstance(seen, PhotonCounts)
+                return estimate_depth(images, z_range_mm, z_mm=planes, method=method)
+            assert isinstance(images, PhotonCounts)
             method = task.method.function or task.method.name
             planes = planes_of(data, task.z_mm)
-            return segment(seen, planes, z_range_mm=z_range_mm, method=method)
+            return segment(images, planes, z_range_mm=z_range_mm, method=method)
 
         if (task.light, task.method.name) not in self._warm:
             work()
@@ -247,18 +247,18 @@ class EvaluationJob:
         """The dataset from whose radiance the texture of a task's objects is known, if it has any."""
         return task.dataset
 
-    def _bound(self, task: Task, data: Dataset, seen: PhotonCounts | Views) -> Row:
+    def _bound(self, task: Task, data: Dataset, images: PhotonCounts | Views) -> Row:
         """`bound_px`, the median of the objects, if there is radiance from which their textures are known."""
-        lit, truth, z_mm = self.full_light_of(task), data.truth, task.z_mm
-        views = lit.views
-        if not isinstance(seen, PhotonCounts) or views is None or not has_depths(data, z_mm):
+        full_light, truth, z_mm = self.full_light_of(task), data.truth, task.z_mm
+        views = full_light.views
+        if not isinstance(images, PhotonCounts) or views is None or not has_depths(data, z_mm):
             return {}
         assert truth is not None
-        planes, identity = planes_of(data, z_mm), identity_of(lit.manifest)
-        if self._lit_sections is None or self._lit_sections[0] != identity:
-            self._lit_sections = identity, reconstruct(views, planes)
+        planes, identity = planes_of(data, z_mm), identity_of(full_light.manifest)
+        if self._full_light_sections is None or self._full_light_sections[0] != identity:
+            self._full_light_sections = identity, reconstruct(views, planes)
         # By their origin where that is known, so no sections are needed to count photons.
-        sections = None if truth.photons is not None else reconstruct(seen, planes)
-        bounds = object_bounds(truth, self._lit_sections[1], sections)
-        known = [each["depth_sigma_px"] for each in bounds if each["depth_sigma_px"] is not None]
-        return {"bound_px": median(known)} if known else {}
+        sections = None if truth.photons is not None else reconstruct(images, planes)
+        bounds = object_bounds(truth, self._full_light_sections[1], sections)
+        sigmas_px = [each["depth_sigma_px"] for each in bounds if each["depth_sigma_px"] is not None]
+        return {"bound_px": median(sigmas_px)} if sigmas_px else {}

@@ -79,14 +79,14 @@ def light_name(light: float | str) -> str:
     return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
 
 
-def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
+def tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
     """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
 
-    Each has its title. `frame` is of `summary.with_yardsticks`, `of_cells` its means by scene, light and
+    Each has its title. `frame` is of `summary.with_yardsticks`, `cell_means` its means by scene, light and
     method.
     """
     for (decisive, title), names in zip(TITLES.items(), (REMOVAL, DEPTH), strict=True):
-        means = of_cells[of_cells["measure"] == decisive]
+        means = cell_means[cell_means["measure"] == decisive]
         if not len(means):
             continue
         ranked = ranks(frame, decisive)
@@ -95,12 +95,12 @@ def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[tuple[str, 
             yield f"{title}, methods compared on the same {unit}", rank_table(ranked, unit)
         yield f"{title} by photons per view", mean_table(means, ["scene", "method"], "light", light_name)
         if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
-            yield f"{title} beside other measures", _measure_table(of_cells, means, names)
+            yield f"{title} beside other measures", _measure_table(cell_means, means, names)
 
 
-def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
+def decisive_means(cell_means: "DataFrame") -> Iterator[tuple[str, str]]:
     """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
-    means = over_scenes(of_cells)
+    means = over_scenes(cell_means)
     for measure, title in TITLES.items():
         of_measure = means[means["measure"] == measure]
         if len(of_measure):
@@ -112,12 +112,12 @@ def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
             yield title, table.to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
 
 
-def _measure_table(of_cells: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> "DataFrame":
+def _measure_table(cell_means: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> "DataFrame":
     """The measures `names` of the methods in `means`, by scene, light and method."""
     import pandas as pd
 
-    is_shown = of_cells["measure"].isin(list(names)) & of_cells["method"].isin(means["method"].unique())
-    shown = of_cells[is_shown]
+    is_shown = cell_means["measure"].isin(list(names)) & cell_means["method"].isin(means["method"].unique())
+    shown = cell_means[is_shown]
     shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
     return mean_table(shown, ["scene", "light", "method"], "measure", lambda name: names[name])
 

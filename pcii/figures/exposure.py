@@ -45,8 +45,8 @@ def smoothing_for(sections: Sequence[np.ndarray]) -> float:
     lit = squares[squares > 0].astype(np.float64)
     if not lit.size:
         return 0.0
-    beside = float(np.quantile(lit, 0.5, weights=lit, method="inverted_cdf")) - 1  # the others of a photon
-    density = max(beside, 1.0) / DENSITY_PX**2
+    neighbours = float(np.quantile(lit, 0.5, weights=lit, method="inverted_cdf")) - 1  # of a photon
+    density = max(neighbours, 1.0) / DENSITY_PX**2
     sigma = float(np.sqrt(SHOWN_PHOTONS / (4 * np.pi * density)))
     return round(sigma, 1) if sigma >= MIN_SMOOTHING_PX else 0.0
 

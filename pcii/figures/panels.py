@@ -85,8 +85,8 @@ def several_axes(
     height, width = (PANEL_IN * side / max(shape) for side in shape)
     size = columns * (max(width, PANEL_IN / 2) + LABELS_IN), rows * (max(height, PANEL_IN / 3) + LABELS_IN)
     figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
-    for unused in grid.flat[count:]:
-        figure.delaxes(unused)
+    for spare in grid.flat[count:]:
+        figure.delaxes(spare)
     return grid.ravel()[:count]
 
 

@@ -81,13 +81,13 @@ def map_image(
     from matplotlib import colormaps
 
     low, high = limits
-    known = np.isfinite(values)
-    place = (np.where(known, values, low) - low) / max(high - low, 1e-30)
+    is_known = np.isfinite(values)
+    place = (np.where(is_known, values, low) - low) / max(high - low, 1e-30)
     image = colormaps[colours](np.clip(place, 0, 1))[..., :3]
     if confidence is not None:
-        image = 1 + (image - 1) * np.where(known, confidence, 0)[..., None]
+        image = 1 + (image - 1) * np.where(is_known, confidence, 0)[..., None]
     image = np.round(255 * image).astype(np.uint8)
-    image[~known] = NO_ANSWER
+    image[~is_known] = NO_ANSWER
     return image
 
 

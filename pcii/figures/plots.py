@@ -136,11 +136,6 @@ def draw_sections(sections: Any, axes: Any, focus: Any = None) -> np.ndarray:
     return panels
 
 
-def draw_masks(focus: Any, axes: Any) -> np.ndarray:
-    """Each section after removal with the outline of its mask."""
-    return draw_sections(focus.sections, axes, focus)
-
-
 def draw_depth(depth: Any, axes: Any, z_range_mm: tuple[float, float] | None = None) -> np.ndarray:
     """Depth in mm with a scale from `z_range_mm`, (near, far), by default of all but outlying depths."""
     panels = several_axes(axes, 1, depth.z_mm.shape)
@@ -159,10 +154,10 @@ def draw_truth(truth: Any, axes: Any, z_range_mm: tuple[float, float] | None = N
 
 def depth_limits_mm(z_mm: np.ndarray) -> tuple[float, float] | None:
     """Near and far end of a scale that holds all but outlying depths; None without depths."""
-    known = z_mm[np.isfinite(z_mm)]
-    if not known.size:
+    known_mm = z_mm[np.isfinite(z_mm)]
+    if not known_mm.size:
         return None
-    near, far = np.quantile(known, [OUTLIER_SHARE, 1 - OUTLIER_SHARE])
+    near, far = np.quantile(known_mm, [OUTLIER_SHARE, 1 - OUTLIER_SHARE])
     middle, half = (near + far) / 2, max((far - near) / 2, MIN_DEPTH_SPAN_MM / 2)
     return float(middle - half), float(middle + half)
 
@@ -212,7 +207,7 @@ DRAWINGS: dict[str, Callable[..., np.ndarray]] = {
     "PhotonCounts": draw_counts,
     "Views": draw_views,
     "Sections": draw_sections,
-    "Segmented": draw_masks,
+    "Segmented": lambda focus, axes: draw_sections(focus.sections, axes, focus),
     "DepthMap": draw_depth,
     "Truth": draw_truth,
 }
