@@ -3,7 +3,7 @@
 A column or row of which nothing is known is left out.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +19,6 @@ from pcii.sections.photon_statistics import (
     section_window_px,
 )
 from pcii.sections.reconstruction import reconstruct
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
 from pcii.types.truth import Truth
@@ -163,24 +161,6 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
         names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
         shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
         yield f"Depth, shares of {_pixels_of_depth(truth)}\n{shares.to_string(float_format='{:.3f}'.format)}"
-
-
-def right_share(grid: CameraGrid, depths_mm: Sequence[float], sure: float) -> str:
-    """How sure a depth map is of its depths, and what that means in mm at the farthest of some."""
-    farthest_mm = max(depths_mm)
-    total_px = total_disparity_px(grid, np.array(farthest_mm))
-    px_mm = farthest_mm - float(depth_of_total_disparity_mm(grid, total_px + 1))
-    within = f"1 px of total disparity, {px_mm:.2g} mm at {three_digits(farthest_mm)} mm"
-    return f"{sure:.0%} of its depths are right to {within}"
-
-
-def three_digits(z_mm: float) -> str:
-    """A depth without an exponent.
-
-    >>> three_digits(1868.2), three_digits(45)
-    ('1870', '45')
-    """
-    return f"{float(f'{z_mm:.3g}'):g}"
 
 
 def _pixels_of_depth(truth: Truth | None) -> str:

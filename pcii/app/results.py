@@ -114,8 +114,8 @@ def _only_writer(target: Path, out: Path) -> Iterator[None]:
     lock = target.with_name(f".{target.name}.lock")
     with locked(lock, out):
         try:
-            for left in temporaries_of(target.parent, target.name):  # by a command that was killed
-                shutil.rmtree(left, ignore_errors=True)
+            for folder in temporaries_of(target.parent, target.name):  # of a command that was killed
+                shutil.rmtree(folder, ignore_errors=True)
             yield
         finally:
             lock.unlink(missing_ok=True)

@@ -14,13 +14,13 @@ from pcii.app.command_options import (
     SectionDepths,
     dataset_at,
 )
-from pcii.app.pipeline import full_light_sections
-from pcii.app.report_tables import result_tables, right_share
+from pcii.app.pipeline import full_light_sections, surface_depths
+from pcii.app.report_tables import result_tables
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
-from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_surfaces
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.exposure import exposed
 from pcii.figures.panels import figure_bytes, new_figure
 from pcii.figures.pictures import mask_image, write_png
@@ -72,7 +72,11 @@ def run(
     if z_range_mm is None or has_depths(data, z_mm):
         planes = planes_of(data, z_mm)
     else:
-        planes = _planes_of_surfaces(data, z_range_mm, depth_method)
+        depths_mm, sentence = surface_depths(data.counts_or_views, z_range_mm, depth_method)
+        if not depths_mm:
+            raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
+        say(sentence)
+        planes = FocalPlanes.at_depths(data.grid, depths_mm)
     z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
@@ -84,16 +88,6 @@ def run(
     _warn_of_few_depths(outcome.depth, data, z_range_mm)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
-
-
-def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: str) -> FocalPlanes:
-    """Planes where the depth map has most surfaces, which are said; `InputError` if it has none."""
-    depths_mm, sure = find_surfaces(data.counts_or_views, z_range_mm, method)
-    if not depths_mm:
-        raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
-    names, share = ", ".join(f"{z:.4g}" for z in depths_mm), right_share(data.grid, depths_mm, sure)
-    say(f"looking at {names} mm, where the depth map has most surfaces; {share}")
-    return FocalPlanes.at_depths(data.grid, depths_mm)
 
 
 def reconstruct(
