@@ -105,11 +105,11 @@ class Pictures:
 
 def slider_planes(outcome: Outcome) -> FocalPlanes:
     """Planes through the depth range and those of the analysis, evenly spaced in total disparity."""
-    grid, own = outcome.dataset.grid, outcome.sections.z_mm
-    near, far = min(outcome.z_range_mm[0], own.min()), max(outcome.z_range_mm[1], own.max())
+    grid, z_mm = outcome.dataset.grid, outcome.sections.z_mm
+    near, far = min(outcome.z_range_mm[0], z_mm.min()), max(outcome.z_range_mm[1], z_mm.max())
     span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
     if span_px == 0:  # one camera has one section for all depths
-        return FocalPlanes.at_depths(grid, own[:1])
+        return FocalPlanes.at_depths(grid, z_mm[:1])
     step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
     planes = FocalPlanes.between(grid, near, far, step_px)
     return planes.take(slice(None, None, -1))  # from near to far
@@ -176,21 +176,21 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
 
 
 def depth_panels(pictures: Pictures) -> list[Panel]:
-    """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
+    """The depth map, the truth and the error if there is a truth, and the confidence."""
     truth, depth = pictures.outcome.dataset.truth, pictures.outcome.depth
     z_mm, confidence = pictures.middles(depth.z_mm), pictures.middles(depth.confidence)
     scale = DEPTH_COLOURS, pictures.outcome.z_range_mm, "mm"
     panels = [_map("estimated depth, paler where less sure", z_mm, *scale, confidence)]
     if truth is not None:
         true_mm = pictures.middles(truth.object_z_mm)
-        words = "true depth of the objects" if truth.has_objects else "true depth"
-        panels.append(_map(words, true_mm, *scale))
+        caption = "true depth of the objects" if truth.has_objects else "true depth"
+        panels.append(_map(caption, true_mm, *scale))
         error, limit = depth_errors(z_mm, true_mm)
-        label, words = "mm, too far above 0", "estimated less true depth"
-        panels.append(_map(words, error, ERROR_COLOURS, (-limit, limit), label))
+        limits, label = (-limit, limit), "mm, too far above 0"
+        panels.append(_map("estimated less true depth", error, ERROR_COLOURS, limits, label))
     confidence = np.where(np.isfinite(z_mm), confidence, np.nan)
-    label, words = "probability of an error below 1 px of total disparity", "confidence"
-    return [*panels, _map(words, confidence, SHARE_COLOURS, (0.0, 1.0), label)]
+    label = "probability of an error below 1 px of total disparity"
+    return [*panels, _map("confidence", confidence, SHARE_COLOURS, (0.0, 1.0), label)]
 
 
 def depth_errors(z_mm: np.ndarray, true_mm: np.ndarray) -> tuple[np.ndarray, float]:

@@ -96,11 +96,11 @@ def _entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth)
             [[region_entropy_bits(plane, region, tops) for plane in pooled] for region in regions]
         )
 
-    others = [
+    without_group = [
         entropies(sections.counts - reconstruct(group, sections.planes).counts)
         for group in _photon_groups(counts)
     ]
-    pseudo_values = GROUPS * entropies(sections.counts) - (GROUPS - 1) * np.stack(others)
+    pseudo_values = GROUPS * entropies(sections.counts) - (GROUPS - 1) * np.stack(without_group)
     return [
         {
             f"{z:g}": (interval := mean_interval(pseudo_values[:, number, plane].tolist())).high
@@ -115,10 +115,10 @@ def _entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth)
 def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:
     """The photons in `GROUPS` groups, the same whenever this is called."""
     rng, events = np.random.default_rng(0), counts.events
-    left = events.n.copy()
+    remaining = events.n.copy()
     for group in range(GROUPS):
-        n = rng.binomial(left, 1 / (GROUPS - group))
-        left -= n
+        n = rng.binomial(remaining, 1 / (GROUPS - group))
+        remaining -= n
         places = (axis[n > 0] for axis in (events.k, events.l, events.i, events.j, n))
         yield PhotonCounts.from_events(*places, grid=counts.grid, cfa=counts.cfa)
 
@@ -165,9 +165,8 @@ def result_tables(outcome: Outcome) -> Iterator[str]:
 
 def _pixels_of_depth(truth: Truth | None) -> str:
     """Of which pixels the errors of depth are."""
-    return (
-        "the objects' pixels" if truth is not None and truth.has_objects else "all pixels with a true depth"
-    )
+    has_objects = truth is not None and truth.has_objects
+    return "the objects' pixels" if has_objects else "all pixels with a true depth"
 
 
 def depth_table(outcome: Outcome) -> "DataFrame":

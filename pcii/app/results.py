@@ -8,7 +8,7 @@ depth.zarr/              z_mm, confidence; an attribute hot_pixels, as segmented
 score.json               as in `Score.to_dict`
 *.png, report.html       pictures and the report
 
-New results are written completely into a folder beside, which takes the place of the earlier one.
+New results are written completely into a temporary folder, which then takes the place of the earlier one.
 """
 
 import shutil

@@ -3,6 +3,8 @@
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -119,13 +121,12 @@ def write_page(folder: Path, out: Path) -> int:
             if other != inside:
                 names = f"{other.name} and {inside.name}"
                 raise InputError(f"{folder}: {names} are both of {about.method!r}, in upper or lower case")
-        own = by_scene(read_rows(inside))
-        others = {row["method"] for row in own}.difference(about.methods)
-        if others:
+        new_rows = by_scene(read_rows(inside))
+        if unnamed := {row["method"] for row in new_rows}.difference(about.methods):
             raise InputError(
-                f"{inside / ROWS}: has rows of {min(others)!r}, which {SUBMISSION} does not name"
+                f"{inside / ROWS}: has rows of {min(unnamed)!r}, which {SUBMISSION} does not name"
             )
-        rows += own
+        rows += new_rows
     frame = with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
@@ -182,15 +183,15 @@ def _values(comparison: Comparison, cell_means: "DataFrame") -> "DataFrame":
     """Means of the measure, photons and seconds of the methods that have it, the bound as the last method."""
     import pandas as pd
 
-    def of(*measures: str) -> "DataFrame":
+    def means_of(*measures: str) -> "DataFrame":
         return cell_means[cell_means["measure"].isin(measures)]
 
-    has_measure = of(comparison.measure)[["scene", "light", "method"]]
-    values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)
-    methods = sorted(has_measure["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
-    bounds = of(comparison.bound_measure).merge(has_measure).drop_duplicates(["scene", "light"], keep="last")
+    cells = means_of(comparison.measure)[["scene", "light", "method"]]
+    values = means_of(comparison.measure, "photons_per_view", "seconds").merge(cells)
+    methods = sorted(cells["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
+    bounds = means_of(comparison.bound_measure).merge(cells).drop_duplicates(["scene", "light"], keep="last")
     if len(bounds):
-        photons = of("photons_per_view").merge(bounds[["scene", "light", "method"]])
+        photons = means_of("photons_per_view").merge(bounds[["scene", "light", "method"]])
         bounds = pd.concat([bounds.assign(measure=comparison.measure), photons])
         values = pd.concat([values, bounds.assign(method=comparison.bound)])
         methods.append(comparison.bound)
@@ -204,12 +205,8 @@ def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
 
 def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
     """Methods by the machines that their seconds are of."""
-    methods: dict[str, list[str]] = {}
-    for row in rows:
-        known = methods.setdefault(row.get("machine", ""), [])
-        if row["method"] not in known:
-            known.append(row["method"])
-    return {machine: sorted(names) for machine, names in sorted(methods.items()) if machine}
+    pairs = sorted({(row["machine"], row["method"]) for row in rows if row.get("machine")})
+    return {machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))}
 
 
 def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> "DataFrame":

@@ -152,9 +152,9 @@ def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
                 raise ValueError("no scores")
             rows[key_of(row)] = row
         except (ValueError, TypeError, RecursionError) as fault:
-            words = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
+            sentence = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
             advice = "delete that line and repeat the command that made it"
-            raise InputError(f"{out / ROWS}: line {number}: {words}; {advice}") from None
+            raise InputError(f"{out / ROWS}: line {number}: {sentence}; {advice}") from None
     return rows
 
 
