@@ -166,7 +166,7 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | PhotonCounts:
+def _without_hot_pixels(images: Views | PhotonCounts, note: Tell) -> Views | PhotonCounts:
     """Counts to judge the cameras by: hot pixels, which stand still in all views, would be sharp at infinity.
 
     Says how many there are. Warns of frames that are saturated.
@@ -179,7 +179,7 @@ def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | Pho
     cleaned, hot = without_hot_pixels(images, FocalPlanes.at_depths(grid, moving_mm))
     if hot:
         share = f"{hot} of {grid.height * grid.width} pixels"
-        tell(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
+        note(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
     return cleaned
 
 

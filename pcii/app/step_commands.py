@@ -12,10 +12,9 @@ from pcii.app.command_options import (
     ExpectedDepths,
     ResultsOut,
     SectionDepths,
-    dataset_at,
 )
 from pcii.app.pipeline import full_light_sections, surface_depths
-from pcii.app.report_tables import result_tables
+from pcii.app.report import result_tables
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
@@ -54,7 +53,7 @@ def run(
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
-    Everything is computed anew, and takes the place of earlier results of the dataset in OUT.
+    Everything is computed again, and replaces earlier results of the dataset in OUT.
 
     Examples of use:
 
@@ -68,7 +67,7 @@ def run(
     depth_method
         A method of depth, as in `pcii depth`.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     if z_range_mm is None or has_depths(data, z_mm):
         planes = planes_of(data, z_mm)
     else:
@@ -109,7 +108,7 @@ def reconstruct(
     subpixel
         Divide each pixel into this many voxels per axis.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
         sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
@@ -147,7 +146,7 @@ def depth(
         posterior or variance-sweep; of counts also sweep-9, sweep-17 or sweep-33, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     near, far = z_range_mm or depth_range_of(data, z_mm)
     planes = planes_of(data, z_mm) if has_depths(data, z_mm) else None
     with results.writing(out, data) as folder:
@@ -183,7 +182,7 @@ def segment(
         shape-from-focus (for comparison); or one that a package registers, module:function, or
         file.py:function.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
         z_range_mm = depth_range_of(data, z_mm)
@@ -227,6 +226,12 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         say("the dataset has no truth: what is compared with it is null")
     else:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
+
+
+def _opened(folder: Path, budget: str | None) -> Dataset:
+    """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
+    dataset = open_dataset(folder)
+    return dataset if budget is None else dataset.at_light(Light.parse(budget))
 
 
 def _say_hot_pixels(estimate: Segmented | DepthMap) -> None:

@@ -98,7 +98,7 @@ GEOMETRIC: Mapping[str, Kind] = {"median_px": "geometric"}
 
 
 def write_page(folder: Path, out: Path) -> int:
-    """Write the page of all submissions in a folder, each a folder of its own; returns how many there are.
+    """Write the page of all submissions in a folder, each a folder in it; returns how many there are.
 
     Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
     one name, a name that could be taken for another one, and submissions of several benchmarks.
@@ -210,7 +210,7 @@ def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
 
 
 def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> "DataFrame":
-    """Whose each method is, and the command that measures it again, in a folder of its own."""
+    """The authors of each method, and the command that measures it again, each into another folder."""
     scores = frame.drop_duplicates(["method", "identity", "light"])["method"].value_counts()
     rows = []
     for folder, about in submissions.items():

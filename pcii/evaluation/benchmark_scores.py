@@ -1,7 +1,7 @@
 """Scores of a method on the public benchmark: of one that is run here, or of maps that were made elsewhere.
 
-Both are an evaluation with a submission.json beside it, which says whose they are.
-Photons, frames and full light of a scene are datasets of their own, and one scene in the frame.
+Both are an evaluation with a submission.json, which names the authors.
+Photons, frames and full light of a scene are separate datasets, and one scene in the frame.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,7 +62,7 @@ class BenchmarkHalf:
 
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
-    """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
+    """Open one half of a benchmark; `InputError` for another folder, and for a damaged dataset."""
     if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     recipe = read_collection(path).recipe

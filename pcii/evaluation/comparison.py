@@ -64,7 +64,7 @@ class Evaluation:
         "median_px". Bars are 95 % intervals, over scenes or, of one scene, over its datasets.
         `style="paper"` is for print:
         `evaluation.plot("iou", style="paper")[0].figure.savefig("iou.pdf")`, or .svg. Raises `InputError` for
-        another measure or style, one that no method has, and axes that are none, or another number of them.
+        another measure or style, a measure that no method has, and other axes or another number of them.
         """
         if measure not in AXES:
             raise InputError(f"measure: expected one of {', '.join(AXES)}, got {measure!r}")
@@ -92,8 +92,8 @@ def evaluate(
 
     `datasets` are dataset folders, collections, or folders of dataset folders. `methods` are those of
     `pcii.removal_methods()`, and those of `pcii.depth_methods()` as "depth:NAME"; "depth" is the default one
-    of depth; "module:function" or "file.py:function"; or functions of one's own: of removal, or of depth as
-    pairs ("depth:NAME", function), which are measured every time, since nobody knows what they follow from.
+    of depth; "module:function" or "file.py:function"; or functions: of removal, or of depth as pairs
+    ("depth:NAME", function), which are measured every time, since their source is not known.
     Without, all that can take the data. `budgets` default to all that each dataset has; among them
     "full-light", its radiance, which some methods of depth take. `z_mm` are depths to look at instead of
     those that recipes name. `executor` does the work.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pcii.base.errors import InputError
-from pcii.evaluation.rows import HEAD, Row, leaves, read_rows
+from pcii.evaluation.rows import HEAD, Row, leaves, plane_parts, read_rows
 from pcii.store.folders import ROWS
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 MAX_COLUMNS = 300
 """Some three times what the measures need; a page takes 10 ms for each."""
-PLANE_HEAD = ("z_mm", "object", "truth")
-"""Members of a plane that are no scores."""
 
 
 def read_frame(out: str | Path) -> "DataFrame":
@@ -76,7 +74,7 @@ def _of_planes(row: Row) -> Iterable[Row]:
     records: dict[float, Row] = {}
     for plane in row["planes"]:
         record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
-        scores = dict(leaves({name: value for name, value in plane.items() if name not in PLANE_HEAD}))
+        scores = dict(leaves(plane_parts(plane)["scores"]))
         if plane["truth"] == "object":
             record |= {"objects": plane["object"]} | scores
         else:

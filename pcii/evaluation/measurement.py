@@ -56,7 +56,7 @@ class Task:
 
     @property
     def data(self) -> Dataset:
-        """The dataset in this light, read anew, so that tasks keep nothing in memory."""
+        """The dataset in this light, opened at each access, so that tasks keep nothing in memory."""
         return self.dataset.at_light(self.light)
 
 
@@ -115,7 +115,7 @@ def _check_methods(dataset: Dataset, methods: Sequence[NamedMethod], tasks: Sequ
 
 
 def _check_depths(dataset: Dataset, tasks: Sequence[Task], z_mm: Sequence[float]) -> None:
-    """Raise `InputError` for depths that methods need and nobody names, or cannot be searched."""
+    """Raise `InputError` if methods need depths and none are named, or if they cannot be searched."""
     of_depth = [estimator_of(task.method.name) is not None for task in tasks]
     if z_mm or not all(of_depth):
         planes_of(dataset, z_mm)

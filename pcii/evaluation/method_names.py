@@ -1,6 +1,6 @@
 """Methods of an evaluation by name: methods of removal by theirs, estimators of depth as depth:NAME.
 
-A function that nobody has registered is named "module:function" or "file.py:function", with "depth:" before
+A function that is not registered is named "module:function" or "file.py:function", with "depth:" before
 it for depth; in Python the function itself stands for it, or a pair of a name and the function.
 
 After `depth:` no name has a colon, so that a full name says which of the two a method is; and none has
@@ -31,7 +31,7 @@ Method = str | Function | tuple[str, Function]
 
 @dataclass(frozen=True)
 class NamedMethod:
-    """A method by its full name, and the function of one that nobody has registered.
+    """A method by its full name, and its function if it is not registered.
 
     `source` is the "module:function" or "file.py:function" that it was loaded from.
     """

@@ -44,8 +44,8 @@ def _measures(scores: Any) -> Any:
     return measures or scores
 
 
-def _plane_parts(plane: Any) -> Any:
-    """A plane with its scores apart."""
+def plane_parts(plane: Mapping[str, Any]) -> Row:
+    """A plane with its scores as one member."""
     scores = dict(plane)
     parts = {name: scores.pop(name) for name in ("z_mm", "object", "truth") if name in scores}
     return parts | {"scores": scores}
@@ -86,7 +86,7 @@ def _row_model() -> "TypeAdapter[Any]":
         machine: NotRequired[Text]
         bound_px: NotRequired[float | None]
         depth: NotRequired[Annotated[dict[str, float | None], by_names]]
-        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
+        planes: NotRequired[list[Annotated[Plane, BeforeValidator(plane_parts)]]]
 
     return TypeAdapter(RowModel)
 
@@ -130,7 +130,7 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
 
 
 def read_rows(out: Path) -> list[Row]:
-    """The last row of each key in a folder; `InputError` if there are none, and for a line that is no row."""
+    """The last row of each key in a folder; `InputError` without rows, and for a line that is no row."""
     rows = _parsed(out, (out / ROWS).read_bytes()) if (out / ROWS).is_file() else {}
     if not rows:
         raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one")

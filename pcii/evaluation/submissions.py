@@ -42,7 +42,7 @@ DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
 MIN_MM, MAX_MM = 1e-3, 1e12
 """Nearest and farthest depth of an answer: errors of others overflow."""
 MAX_OVERHEAD_BYTES = 1 << 16
-"""Size of a submission.json at most, and of what an .npz file has beside its numbers."""
+"""Largest size of a submission.json, and of all but the numbers in an .npz file."""
 Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
 RUN, SCORED = get_args(Made)
 

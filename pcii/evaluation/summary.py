@@ -205,7 +205,7 @@ def over_scenes(cell_means: "DataFrame") -> "DataFrame":
 
 
 def ranked_over(frame: "DataFrame", measure: str) -> Over:
-    """What methods are ranked over if nothing is said: scenes, and of one scene its datasets."""
+    """What methods are ranked over by default: scenes, or the datasets of a single scene."""
     scenes = frame["scene"][frame[measure].notna()].nunique() if measure in frame else 0
     return "datasets" if scenes < MIN_SCENES else "scenes"
 

@@ -55,7 +55,7 @@ DEPTH = {
 }
 """The same of depth."""
 MAX_DETAILED_SCENES = 12
-"""Largest number of scenes with tables of all measures: those of more make a page that nobody can load."""
+"""Largest number of scenes with tables of all measures: a page with those of more is too large to load."""
 
 
 def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:

@@ -1,4 +1,4 @@
-"""Examples to train on: parts of the films of datasets, in a random pose, with light that is drawn anew.
+"""Examples to train on: parts of the films of datasets, in a random pose and in light drawn at each access.
 
 All of it is exact. Photons that are kept at random are Poisson counts of less light. Where a film is mirrored
 or transposed its cameras are too, and so are its Bayer pattern, pitch and shear, so that disparities stay.
@@ -76,7 +76,7 @@ def examples(
 
 @dataclass(eq=False)
 class Examples(Sequence[Example]):
-    """A sequence with one example for each dataset. Each access opens a dataset of a collection anew."""
+    """A sequence with one example for each dataset. Each access opens its dataset again."""
 
     datasets: Sequence[Dataset]
     fields: tuple[Field, ...]

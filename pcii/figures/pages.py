@@ -81,7 +81,13 @@ def table_html(table: "DataFrame", title: str, css_class: str = "") -> "Markup":
 
 
 def table_markdown(table: "DataFrame") -> str:
-    """A table in Markdown, all texts escaped."""
+    """A table in Markdown, all texts escaped.
+
+    >>> print(table_markdown(text_table([("a|b", "1")], ("what", "value"))))
+    | what | value |
+    | :-- | --: |
+    | a\\|b | 1 |
+    """
     columns = table.reset_index()
     header, *rows = (map(in_markdown, row) for row in [[*columns.columns], *columns.to_numpy().tolist()])
     rule = [":--"] * table.index.nlevels + ["--:"] * len(table.columns)
