@@ -11,17 +11,20 @@ import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.base.compiled_loops import each_in_threads
-from pcii.figures.exposure import block_px, exposed, photon_picture, smoothing_for
 from pcii.figures.panels import colour_bar_uri
 from pcii.figures.pictures import (
     DEPTH_COLOURS,
     ERROR_COLOURS,
     SHARE_COLOURS,
     agreement_image,
+    block_px,
     drawing_uri,
+    exposed,
     map_image,
     mask_image,
     photo_uri,
+    photon_picture,
+    smoothing_for,
 )
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus

@@ -20,9 +20,8 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
-from pcii.figures.exposure import exposed
 from pcii.figures.panels import figure_bytes, new_figure
-from pcii.figures.pictures import mask_image, write_png
+from pcii.figures.pictures import exposed, mask_image, write_png
 from pcii.figures.plots import draw_depth
 from pcii.metrics import scoring
 from pcii.removal import methods as removal

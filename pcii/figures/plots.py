@@ -13,7 +13,6 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import in_html
-from pcii.figures.exposure import PANEL_PX, block_px, exposed, photon_picture
 from pcii.figures.panels import (
     COLOURS,
     GRID_COLOUR,
@@ -25,7 +24,16 @@ from pcii.figures.panels import (
     plot_label,
     several_axes,
 )
-from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image, uri_of
+from pcii.figures.pictures import (
+    DEPTH_COLOURS,
+    NO_ANSWER,
+    PANEL_PX,
+    block_px,
+    depth_image,
+    exposed,
+    photon_picture,
+    uri_of,
+)
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:

@@ -31,8 +31,7 @@ from pcii.figures import (
     smoothed,
     smoothing_for,
 )
-from pcii.figures.exposure import SHOWN_PHOTONS
-from pcii.figures.pictures import NO_ANSWER
+from pcii.figures.pictures import NO_ANSWER, SHOWN_PHOTONS
 from pcii.types import FocalPlanes
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
