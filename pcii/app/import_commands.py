@@ -155,7 +155,7 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    # Wrong numbers make no order of views right.
+    # With wrong numbers of the cameras, which a warning names, no order of views is right.
     is_judged = not imported.states_cameras and not any(note.startswith("warning:") for note in notes)
     advice = _advice(fit, order, lenses, z_range) if is_judged else None
     if advice is not None:

@@ -82,11 +82,11 @@ def analyse(
         return result
 
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
-    with ThreadPoolExecutor(2) as others:
-        light = others.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
+    with ThreadPoolExecutor(2) as pool:
+        light = pool.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
         sections = None if counts is None else timed("sections", partial(reconstruct, counts, planes))
         estimate = partial(_depth_of, data, z_range_mm, planes, depth_method)
-        depth = others.submit(timed, "depth", estimate)
+        depth = pool.submit(timed, "depth", estimate)
         focus: list[Segmented] = []
         for name, remove in removals.items():
             assert counts is not None

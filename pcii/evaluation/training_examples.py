@@ -248,27 +248,25 @@ def _of_split(
         raise InputError(
             f"split, by: expected one of {', '.join(SPLITS)}, and scene or seed, got {split}, {by}"
         )
-    if isinstance(data, Collection):
-        keys = [{"scene": (row["scene"], row["scene_number"]), "seed": row["seed"]} for row in data.rows]
-        splits = [row["split"] for row in data.rows]
-    else:
-        recipes = [dataset.manifest.recipe for dataset in data]
-        keys = [{"scene": (r.get("scene"), r.get("scene_number")), "seed": r.get("seed")} for r in recipes]
-        splits = [None] * len(keys)
+    is_collection = isinstance(data, Collection)
+    rows = data.rows if is_collection else [dict(dataset.manifest.recipe) for dataset in data]
+    splits = [row["split"] if is_collection else None for row in rows]
     if shares is not None:
         if min(shares) < 0 or not math.isclose(sum(shares), 1, abs_tol=1e-6):
             raise InputError(f"shares: expected three shares that sum to 1, got {shares}")
         ends = np.cumsum(shares)
-        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key[by]), "right")), 2)] for key in keys]
+        of_scene = by == "scene"
+        keys = [(r.get("scene"), r.get("scene_number")) if of_scene else r.get("seed") for r in rows]
+        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key), "right")), 2)] for key in keys]
     elif None in splits:
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
     mask = [each == split for each in splits]
     if not any(mask):
         other = "scene" if by == "seed" else "seed"
         raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by={other!r}")
-    return data[mask] if isinstance(data, Collection) else [*compress(data, mask)]
+    return data[mask] if is_collection else [*compress(data, mask)]
 
 
 def _hashed(key: object) -> float:
-    """A number from 0 to 1 that a key has everywhere."""
+    """A number from 0 to 1 that is the same for a key on every machine."""
     return int.from_bytes(hashlib.sha256(repr(key).encode()).digest()[:8], "big") / 2**64
