@@ -16,7 +16,7 @@ from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_json_safely
-from pcii.evaluation.tables import markdown
+from pcii.figures.pages import table_markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 
@@ -57,8 +57,8 @@ def measure(study: Study, size: Size, out: Path) -> Record:
     measured = study.measure(**study.sizes[size])
     record = Record(study.name, size, date, time.perf_counter() - start, place, versions(), measured)
     write_record(out, record)
-    for table in tables_of(measured.rows):
-        print(f"\n{table.title}\n\n{markdown(table)}", flush=True)
+    for title, table in tables_of(measured.rows).items():
+        print(f"\n{title}\n\n{table_markdown(table)}", flush=True)
     print(f"\n{study.reading(measured)}\n", flush=True)
     return record
 

@@ -17,9 +17,10 @@ import pcii
 from pcii.base.progress import Stages
 from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
 from pcii.evaluation.comparison import find_datasets
+from pcii.evaluation.measurement import tasks_of
 from pcii.evaluation.method_names import NamedMethod
-from pcii.evaluation.tables import Table, light_name, markdown
-from pcii.evaluation.tasks import tasks_of
+from pcii.evaluation.tables import light_name
+from pcii.figures.pages import table_markdown, text_table
 from pcii.removal.posterior_masks import masks_of
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.photon_limit import Light
@@ -56,7 +57,7 @@ def main() -> int:
 
     lights = list(dict.fromkeys(str(task.light) for task in tasks))
     rows = [(name, *(cell(name, light) for light in lights)) for name in methods]
-    print(markdown(Table("", ("constant", *map(light_name, lights)), tuple(rows))))
+    print(table_markdown(text_table(rows, ("constant", *map(light_name, lights)))))
     return 0
 
 

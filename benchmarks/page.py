@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.figures import draw
 from benchmarks.machine import in_words, was_busy
 from benchmarks.results import Record, Row, Study, Value, label
 from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.tables import Table, markdown
+from pcii.figures.pages import table_markdown, text_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PICTURES = "benchmarks"
 """Folder of the figures, beside the page."""
@@ -35,11 +38,12 @@ def _section(study: Study, record: Record) -> str:
     measured, machine = record.measured, record.machine
     tables = tables_of(measured.rows)
     if measured.ratios:
-        rows = tuple((name, told(ratio)) for name, ratio in measured.ratios.items())
-        tables.append(Table("Ratios", ("how many times better, side by side", "ratio"), rows))
+        ratios = [(name, told(ratio)) for name, ratio in measured.ratios.items()]
+        tables["Ratios"] = text_table(ratios, ("how many times better, side by side", "ratio"))
     seeds = f", seeds {', '.join(map(str, measured.seeds))}" if measured.seeds else ""
     parts = [f"## {study.title}", f"![{study.title}]({PICTURES}/{study.name}.png)", study.reading(measured)]
-    parts += [part for table in tables for part in (f"**{table.title}**", markdown(table))]
+    for title, table in tables.items():
+        parts += [f"**{title}**", table_markdown(table)]
     parts.append(
         f"Study `{study.name}`, {record.size} size, {record.date[:10]}, commit {record.versions['commit']},"
         f" {record.wall_s:.0f} s on {in_words(machine)}{seeds}."
@@ -52,9 +56,9 @@ def _section(study: Study, record: Record) -> str:
     return "\n\n".join(parts)
 
 
-def tables_of(rows: Sequence[Row]) -> list[Table]:
-    """The tables of a study, with a column for each parameter and quantity that any of its rows has."""
-    found: list[Table] = []
+def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
+    """The tables of a study by title, with a column for each parameter and quantity that any row has."""
+    tables: dict[str, DataFrame] = {}
     for title in dict.fromkeys(row.table for row in rows):
         own = [row for row in rows if row.table == title]
         parameters = list(dict.fromkeys(name for row in own for name in row.parameters))
@@ -67,8 +71,8 @@ def tables_of(rows: Sequence[Row]) -> list[Table]:
             )
             for row in own
         ]
-        found.append(Table(title, ("what", *map(label, (*parameters, *quantities))), tuple(cells)))
-    return found
+        tables[title] = text_table(cells, ("what", *map(label, (*parameters, *quantities))))
+    return tables
 
 
 def told(value: Value | None) -> str:

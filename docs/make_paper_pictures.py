@@ -14,8 +14,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 import pcii
-from pcii.figures.exposure import filled_means, smoothed, smoothing_for
-from pcii.figures.pictures import depth_image, to_srgb8, white_level
+from pcii.figures.pictures import depth_image, filled_means, smoothed, smoothing_for, to_srgb8, white_level
 from pcii.metrics.true_masks import TrueFocus
 from pcii.types.bayer import colour_index
 

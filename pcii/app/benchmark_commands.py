@@ -5,9 +5,9 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from pcii.app.command_options import Out
+from pcii.app.command_options import Out, Workers
 from pcii.base.command_line import say, say_next_page
-from pcii.base.executor import THIS_PROCESS, Executor
+from pcii.base.executor import THIS_PROCESS
 from pcii.base.progress import Stages
 from pcii.evaluation.benchmark_page import write_page
 from pcii.evaluation.benchmark_scores import open_benchmark, run_method, score_submission
@@ -18,7 +18,6 @@ from pcii.store.collection import Half
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
 ScoresOut = Annotated[Out, Parameter(help="Folder for the scores: new, empty, or those of an earlier call.")]
-Workers = Annotated[Executor, Parameter(name="*")]
 
 benchmark = App(
     name="benchmark",

@@ -7,9 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import CoercionError, Parameter, Token
 
-from pcii.store.dataset import Dataset, open_dataset
+from pcii.base.executor import Executor
 from pcii.types.arrays import MOST_DEPTHS
-from pcii.types.photon_limit import Light
 
 
 def depths_mm(text: str) -> list[float]:
@@ -47,12 +46,7 @@ def _all_depths_mm(kind: Any, tokens: Sequence[Token]) -> tuple[float, ...]:
     return tuple(depths)
 
 
-def dataset_at(folder: Path, budget: str | None) -> Dataset:
-    """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
-    dataset = open_dataset(folder)
-    return dataset if budget is None else dataset.at_light(Light.parse(budget))
-
-
+Workers = Annotated[Executor, Parameter(name="*")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 ResultsOut = Annotated[Out, Parameter(help="Folder for the results: new, or with results of this dataset.")]
 DatasetFolder = Annotated[Path, Parameter(help="A dataset folder.")]

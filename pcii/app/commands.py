@@ -6,12 +6,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pcii.app.benchmark_commands import benchmark, say_scores
-from pcii.app.command_options import Out, SectionDepths
+from pcii.app.command_options import Out, SectionDepths, Workers
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
 from pcii.base.command_line import results_folder, say, say_next
-from pcii.base.executor import THIS_PROCESS, Executor
+from pcii.base.executor import THIS_PROCESS
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
 from pcii.exchange.export_command import export
@@ -53,7 +53,7 @@ def evaluate(
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
     z_mm: SectionDepths = (),
-    executor: Annotated[Executor, Parameter(name="*")] = THIS_PROCESS,
+    executor: Workers = THIS_PROCESS,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 

@@ -7,11 +7,10 @@ import numpy as np
 from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
-from pcii.app.report_tables import right_share, three_digits
+from pcii.app.pipeline import depths_text, surface_depths
 from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
-from pcii.depth.methods import find_surfaces
 from pcii.evidence.camera_fit import CameraFit, check_grid
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.exchange.depth_files import NO_DEPTH, DepthFile
@@ -134,7 +133,12 @@ def import_dataset(
         z_range = z_range_mm or imported.z_range_mm
         truth = true_depth.truth_for(imported.images.grid, notes.append) or imported.truth
         fit = check_grid(_without_hot_pixels(imported.images, notes.append), z_range, order=order)
-        surfaces = _surfaces_of(imported.images, z_range, notes.append) if not z_mm else ()
+        surfaces: tuple[float, ...] = ()
+        is_counted = isinstance(imported.images, PhotonCounts)
+        if is_counted and not z_mm and z_range is not None and imported.images.grid.view_count > 1:
+            # In the noise of few photons contrast is no sure sign.
+            surfaces, sentence = surface_depths(imported.images, z_range)
+            notes += [sentence] * bool(surfaces)
         dataset = save_dataset(
             out,
             images,
@@ -151,18 +155,18 @@ def import_dataset(
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    # Wrong numbers make no order of views right.
+    # With wrong numbers of the cameras, which a warning names, no order of views is right.
     is_judged = not imported.states_cameras and not any(note.startswith("warning:") for note in notes)
     advice = _advice(fit, order, lenses, z_range) if is_judged else None
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
     if not surfaces:
-        _say_depths(fit, is_counted=isinstance(imported.images, PhotonCounts))
+        _say_depths(fit, is_counted=is_counted)
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | PhotonCounts:
+def _without_hot_pixels(images: Views | PhotonCounts, note: Tell) -> Views | PhotonCounts:
     """Counts to judge the cameras by: hot pixels, which stand still in all views, would be sharp at infinity.
 
     Says how many there are. Warns of frames that are saturated.
@@ -175,19 +179,8 @@ def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | Pho
     cleaned, hot = without_hot_pixels(images, FocalPlanes.at_depths(grid, moving_mm))
     if hot:
         share = f"{hot} of {grid.height * grid.width} pixels"
-        tell(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
+        note(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
     return cleaned
-
-
-def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, tell: Tell) -> tuple[float, ...]:
-    """Depths of the surfaces of photon counts within a range, in whose noise contrast is no sure sign."""
-    if isinstance(images, Views) or z_range is None or images.grid.view_count < 2:
-        return ()
-    depths_mm, sure = find_surfaces(images, z_range)
-    if depths_mm:
-        names = ", ".join(map(three_digits, depths_mm))
-        tell(f"the depth map has most surfaces at {names} mm; {right_share(images.grid, depths_mm, sure)}")
-    return depths_mm
 
 
 def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> str | None:
@@ -212,7 +205,7 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
         x, y = fit.shear_px
         return f"things are sharp at disparities below 0; add a shift to --shear-px, such as {x:g} {y:g}"
     if z_range is not None and fit.z_mm and not any(z_range[0] <= z <= z_range[1] for z in fit.z_mm):
-        where = f"sharpest at {', '.join(map(three_digits, fit.z_mm))} mm, all outside of --z-range-mm"
+        where = f"sharpest at {depths_text(fit.z_mm)} mm, all outside of --z-range-mm"
         return f"{where}; correct the range, --pitch-mm, --focal-mm or the size of pixels"
     return None
 
@@ -220,12 +213,12 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
 def _say_depths(fit: CameraFit, *, is_counted: bool) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
     if fit.z_mm:
-        say(f"sharpest at {', '.join(map(three_digits, fit.z_mm))} mm")
+        say(f"sharpest at {depths_text(fit.z_mm)} mm")
     elif fit.nearest_mm is None:
         say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
     else:
         say(
-            f"nothing is clearly sharp from {three_digits(fit.nearest_mm)} mm to infinity; "
+            f"nothing is clearly sharp from {depths_text([fit.nearest_mm])} mm to infinity; "
             f"{'in little light --z-range-mm finds more; else ' if is_counted else ''}correct the order of "
             "views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
         )

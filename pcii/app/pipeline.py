@@ -7,8 +7,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeVar
 
+import numpy as np
+
 from pcii.base.progress import Report, silent
-from pcii.depth.methods import DEFAULT_METHOD, depth_posterior, estimate_depth, find_depth_method
+from pcii.depth.methods import (
+    DEFAULT_METHOD,
+    depth_posterior,
+    estimate_depth,
+    find_depth_method,
+    find_surfaces,
+)
 from pcii.depth.posterior_depth import depth_map_of
 from pcii.metrics.scoring import score
 from pcii.removal.methods import DEFAULT_METHODS, find_method
@@ -17,6 +25,7 @@ from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.types.focal_planes import FocalPlanes, check_depth_counts
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
@@ -73,11 +82,11 @@ def analyse(
         return result
 
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
-    with ThreadPoolExecutor(2, "beside") as beside:
-        light = beside.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
+    with ThreadPoolExecutor(2) as pool:
+        light = pool.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
         sections = None if counts is None else timed("sections", partial(reconstruct, counts, planes))
         estimate = partial(_depth_of, data, z_range_mm, planes, depth_method)
-        depth = beside.submit(timed, "depth", estimate)
+        depth = pool.submit(timed, "depth", estimate)
         focus: list[Segmented] = []
         for name, remove in removals.items():
             assert counts is not None
@@ -104,6 +113,30 @@ def _depth_of(
         return estimate_depth(data, z_range_mm, method=method), None
     posterior = depth_posterior(data, z_range_mm, z_mm=planes)
     return depth_map_of(posterior, z_range_mm), posterior
+
+
+def surface_depths(
+    data: PhotonCounts | Views, z_range_mm: tuple[float, float], method: str = DEFAULT_METHOD
+) -> tuple[tuple[float, ...], str]:
+    """Depths in mm where the depth map has most surfaces, and a sentence on them and how sure they are."""
+    depths_mm, sure = find_surfaces(data, z_range_mm, method)
+    if not depths_mm:
+        return (), ""
+    farthest_mm = max(depths_mm)
+    total_px = total_disparity_px(data.grid, np.array(farthest_mm))
+    px_mm = farthest_mm - float(depth_of_total_disparity_mm(data.grid, total_px + 1))
+    right = f"{sure:.0%} of its depths are right to 1 px of total disparity, {px_mm:.2g} mm"
+    surfaces = f"the depth map has most surfaces at {depths_text(depths_mm)} mm"
+    return depths_mm, f"{surfaces}; {right} at {depths_text([farthest_mm])} mm"
+
+
+def depths_text(z_mm: Sequence[float]) -> str:
+    """Depths with three digits and without exponents.
+
+    >>> depths_text([1868.2, 45])
+    '1870, 45'
+    """
+    return ", ".join(f"{float(f'{z:.3g}'):g}" for z in z_mm)
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes) -> Sections | None:

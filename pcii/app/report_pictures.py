@@ -4,32 +4,27 @@ All show the same part of the frame, in blocks of `step_px` x `step_px` pixels i
 objects or, without any, around what the methods claim.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.base.compiled_loops import each_in_threads
-from pcii.figures.exposure import (
-    block_px,
-    encoded,
-    exposed,
-    filled_means,
-    image_block_sums,
-    photon_picture,
-    smoothed,
-    smoothing_for,
-)
 from pcii.figures.panels import colour_bar_uri
 from pcii.figures.pictures import (
     DEPTH_COLOURS,
     ERROR_COLOURS,
     SHARE_COLOURS,
     agreement_image,
+    block_px,
     drawing_uri,
+    exposed,
     map_image,
     mask_image,
     photo_uri,
+    photon_picture,
+    smoothing_for,
 )
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
@@ -47,14 +42,11 @@ MIN_SLIDER_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 SECTIONS_AT_ONCE = 4
 """Sections of the slider in memory at once; each such group reads all views."""
-WHOLE = (slice(None), slice(None))
 UNSATURATED_SHARE = 0.95
 """Share of the errors of depth that lie within the scale of their colours."""
 
 Panel = dict[str, str]
 """An `image` as a data URI and its `caption`; of maps also the colour `bar`."""
-Estimate = tuple[np.ndarray, np.ndarray]
-"""Means of the blocks of a section and their numbers of samples, (h, w, C) each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,32 +92,27 @@ class Pictures:
         )
         return image[rows][:, cols]
 
+    def of_sections(self, stacks: Iterable[Sections], smoothing_px: float) -> list[np.ndarray]:
+        """8-bit pictures of all sections of some stacks, at the same exposure.
 
-def block_estimates(
-    sections: Sections, step_px: int, smoothing_px: float = 0.0, box: tuple[slice, slice] = WHOLE
-) -> list[Estimate]:
-    """Estimates of the blocks of a part of each section: the sums of its counts over its samples.
-
-    Both are smoothed by a Gaussian with a standard deviation of `smoothing_px` pixels of the frame. At some
-    depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the estimate is
-    that of the blocks around.
-    """
-    estimates: list[Estimate] = []
-    for counts, coverage in zip(sections.counts, sections.coverage, strict=True):
-        sums, samples = (image_block_sums(values[box], step_px) for values in (counts, coverage))
-        if smoothing_px:
-            sums, samples = smoothed(sums, samples, smoothing_px / step_px)
-        estimates.append((filled_means(sums, samples), samples))
-    return estimates
+        At some depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic: these
+        have the mean of the blocks around.
+        """
+        images = (
+            (counts[self.box], coverage[self.box])
+            for stack in stacks
+            for counts, coverage in zip(stack.counts, stack.coverage, strict=True)
+        )
+        return exposed(images, self.step_px, smoothing_px)
 
 
 def slider_planes(outcome: Outcome) -> FocalPlanes:
     """Planes through the depth range and those of the analysis, evenly spaced in total disparity."""
-    grid, own = outcome.dataset.grid, outcome.sections.z_mm
-    near, far = min(outcome.z_range_mm[0], own.min()), max(outcome.z_range_mm[1], own.max())
+    grid, z_mm = outcome.dataset.grid, outcome.sections.z_mm
+    near, far = min(outcome.z_range_mm[0], z_mm.min()), max(outcome.z_range_mm[1], z_mm.max())
     span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
     if span_px == 0:  # one camera has one section for all depths
-        return FocalPlanes.at_depths(grid, own[:1])
+        return FocalPlanes.at_depths(grid, z_mm[:1])
     step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
     planes = FocalPlanes.between(grid, near, far, step_px)
     return planes.take(slice(None, None, -1))  # from near to far
@@ -136,19 +123,16 @@ def slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
 
     Captions are depths.
     """
-    planes, estimates = slider_planes(pictures.outcome), list[Estimate]()
-    for first in range(0, len(planes), SECTIONS_AT_ONCE):
-        group = planes.take(slice(first, first + SECTIONS_AT_ONCE))
-        sections = reconstruct(pictures.outcome.dataset.counts_or_views, group)
-        estimates += block_estimates(sections, pictures.step_px, pictures.smoothing_px, pictures.box)
-    images = each_in_threads(photo_uri, encoded(estimates))
-    panels = [
-        {"image": image, "caption": f"{z:.4g} mm"} for image, z in zip(images, planes.z_mm, strict=True)
-    ]
-    first = np.abs(
-        planes.total_disparity_px - pictures.outcome.sections.planes.total_disparity_px[0]
-    ).argmin()
-    return panels, int(first)
+    outcome, planes = pictures.outcome, slider_planes(pictures.outcome)
+    stacks = (
+        reconstruct(outcome.dataset.counts_or_views, planes.take(slice(first, first + SECTIONS_AT_ONCE)))
+        for first in range(0, len(planes), SECTIONS_AT_ONCE)
+    )
+    images = each_in_threads(photo_uri, pictures.of_sections(stacks, pictures.smoothing_px))
+    captions = (f"{z:.4g} mm" for z in planes.z_mm)
+    panels = [{"image": image, "caption": text} for image, text in zip(images, captions, strict=True)]
+    off_px = planes.total_disparity_px - outcome.sections.planes.total_disparity_px[0]
+    return panels, int(np.abs(off_px).argmin())
 
 
 def input_panels(pictures: Pictures) -> list[Panel]:
@@ -174,12 +158,10 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
     if truth is not None:
         true = TrueFocus(outcome.sections.planes, truth).masks(truth.mask_kind)  # (Z, H, W)
         what = "objects" if truth.are_objects_known else "what is in focus"
-    images = encoded(block_estimates(outcome.sections, pictures.step_px, pictures.smoothing_px, pictures.box))
+    images = pictures.of_sections([outcome.sections], pictures.smoothing_px)
     lights = {pictures.light: images}
     if outcome.dataset.has_counts and outcome.full_light is not None:
-        lights["full light (Eq. 2)"] = encoded(
-            block_estimates(outcome.full_light, pictures.step_px, box=pictures.box)
-        )
+        lights["full light (Eq. 2)"] = pictures.of_sections([outcome.full_light], 0.0)
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
         sections = [_photo(light[plane], f"section at {z:g} mm, {words}") for words, light in lights.items()]
@@ -197,21 +179,21 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
 
 
 def depth_panels(pictures: Pictures) -> list[Panel]:
-    """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
+    """The depth map, the truth and the error if there is a truth, and the confidence."""
     truth, depth = pictures.outcome.dataset.truth, pictures.outcome.depth
     z_mm, confidence = pictures.middles(depth.z_mm), pictures.middles(depth.confidence)
     scale = DEPTH_COLOURS, pictures.outcome.z_range_mm, "mm"
     panels = [_map("estimated depth, paler where less sure", z_mm, *scale, confidence)]
     if truth is not None:
         true_mm = pictures.middles(truth.object_z_mm)
-        words = "true depth of the objects" if truth.has_objects else "true depth"
-        panels.append(_map(words, true_mm, *scale))
+        caption = "true depth of the objects" if truth.has_objects else "true depth"
+        panels.append(_map(caption, true_mm, *scale))
         error, limit = depth_errors(z_mm, true_mm)
-        label, words = "mm, too far above 0", "estimated less true depth"
-        panels.append(_map(words, error, ERROR_COLOURS, (-limit, limit), label))
+        limits, label = (-limit, limit), "mm, too far above 0"
+        panels.append(_map("estimated less true depth", error, ERROR_COLOURS, limits, label))
     confidence = np.where(np.isfinite(z_mm), confidence, np.nan)
-    label, words = "probability of an error below 1 px of total disparity", "confidence"
-    return [*panels, _map(words, confidence, SHARE_COLOURS, (0.0, 1.0), label)]
+    label = "probability of an error below 1 px of total disparity"
+    return [*panels, _map("confidence", confidence, SHARE_COLOURS, (0.0, 1.0), label)]
 
 
 def depth_errors(z_mm: np.ndarray, true_mm: np.ndarray) -> tuple[np.ndarray, float]:

@@ -8,7 +8,7 @@ depth.zarr/              z_mm, confidence; an attribute hot_pixels, as segmented
 score.json               as in `Score.to_dict`
 *.png, report.html       pictures and the report
 
-New results are written completely into a folder beside, which takes the place of the earlier one.
+New results are written completely into a temporary folder, which then takes the place of the earlier one.
 """
 
 import shutil
@@ -32,7 +32,7 @@ from pcii.base.safe_files import (
     write_json_safely,
 )
 from pcii.depth.methods import DEFAULT_METHOD
-from pcii.evaluation.rows import identity_of
+from pcii.evaluation.measurement import identity_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.store.folders import (
@@ -114,8 +114,8 @@ def _only_writer(target: Path, out: Path) -> Iterator[None]:
     lock = target.with_name(f".{target.name}.lock")
     with locked(lock, out):
         try:
-            for left in temporaries_of(target.parent, target.name):  # by a command that was killed
-                shutil.rmtree(left, ignore_errors=True)
+            for folder in temporaries_of(target.parent, target.name):  # of a command that was killed
+                shutil.rmtree(folder, ignore_errors=True)
             yield
         finally:
             lock.unlink(missing_ok=True)

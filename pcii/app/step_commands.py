@@ -12,19 +12,16 @@ from pcii.app.command_options import (
     ExpectedDepths,
     ResultsOut,
     SectionDepths,
-    dataset_at,
 )
-from pcii.app.pipeline import full_light_sections
-from pcii.app.report_pictures import block_estimates
-from pcii.app.report_tables import result_tables, right_share
+from pcii.app.pipeline import full_light_sections, surface_depths
+from pcii.app.report import result_tables
 from pcii.base.command_line import say, say_next, say_next_page
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
-from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_surfaces
-from pcii.figures.exposure import encoded
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
 from pcii.figures.panels import figure_bytes, new_figure
-from pcii.figures.pictures import mask_image, write_png
+from pcii.figures.pictures import exposed, mask_image, write_png
 from pcii.figures.plots import draw_depth
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
@@ -55,7 +52,7 @@ def run(
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
-    Everything is computed anew, and takes the place of earlier results of the dataset in OUT.
+    Everything is computed again, and replaces earlier results of the dataset in OUT.
 
     Examples of use:
 
@@ -69,11 +66,15 @@ def run(
     depth_method
         A method of depth, as in `pcii depth`.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     if z_range_mm is None or has_depths(data, z_mm):
         planes = planes_of(data, z_mm)
     else:
-        planes = _planes_of_surfaces(data, z_range_mm, depth_method)
+        depths_mm, sentence = surface_depths(data.counts_or_views, z_range_mm, depth_method)
+        if not depths_mm:
+            raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
+        say(sentence)
+        planes = FocalPlanes.at_depths(data.grid, depths_mm)
     z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
@@ -85,16 +86,6 @@ def run(
     _warn_of_few_depths(outcome.depth, data, z_range_mm)
     say(f"report: {out / results.REPORT}")
     say_next_page(out / results.REPORT)
-
-
-def _planes_of_surfaces(data: Dataset, z_range_mm: tuple[float, float], method: str) -> FocalPlanes:
-    """Planes where the depth map has most surfaces, which are said; `InputError` if it has none."""
-    depths_mm, sure = find_surfaces(data.counts_or_views, z_range_mm, method)
-    if not depths_mm:
-        raise InputError(f"{data.path}: no depth is found in the range; name depths with --z-mm")
-    names, share = ", ".join(f"{z:.4g}" for z in depths_mm), right_share(data.grid, depths_mm, sure)
-    say(f"looking at {names} mm, where the depth map has most surfaces; {share}")
-    return FocalPlanes.at_depths(data.grid, depths_mm)
 
 
 def reconstruct(
@@ -116,12 +107,13 @@ def reconstruct(
     subpixel
         Divide each pixel into this many voxels per axis.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
         sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
         results.save_sections(folder, sections)
-        for z, picture in zip(sections.z_mm, encoded(block_estimates(sections, 1)), strict=True):
+        pictures = exposed(zip(sections.counts, sections.coverage, strict=True), 1)
+        for z, picture in zip(sections.z_mm, pictures, strict=True):
             write_png(folder / f"section_{z:g}mm.png", picture)
     say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
     saturated = int(np.count_nonzero(np.isinf(sections.estimate)))
@@ -153,7 +145,7 @@ def depth(
         posterior or variance-sweep; of counts also sweep-9, sweep-17 or sweep-33, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     near, far = z_range_mm or depth_range_of(data, z_mm)
     planes = planes_of(data, z_mm) if has_depths(data, z_mm) else None
     with results.writing(out, data) as folder:
@@ -189,7 +181,7 @@ def segment(
         shape-from-focus (for comparison); or one that a package registers, module:function, or
         file.py:function.
     """
-    data = dataset_at(dataset, budget)
+    data = _opened(dataset, budget)
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
         z_range_mm = depth_range_of(data, z_mm)
@@ -233,6 +225,12 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         say("the dataset has no truth: what is compared with it is null")
     else:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
+
+
+def _opened(folder: Path, budget: str | None) -> Dataset:
+    """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
+    dataset = open_dataset(folder)
+    return dataset if budget is None else dataset.at_light(Light.parse(budget))
 
 
 def _say_hot_pixels(estimate: Segmented | DepthMap) -> None:

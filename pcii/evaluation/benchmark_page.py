@@ -3,16 +3,18 @@
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
-from pcii.evaluation.curves import accuracy_plot
+from pcii.evaluation.evaluation_page import ABOUT_YARDSTICKS, accuracy_plot
+from pcii.evaluation.frames import frame_of
 from pcii.evaluation.method_names import estimator_of, known_methods
-from pcii.evaluation.pages import ABOUT_YARDSTICKS, page
-from pcii.evaluation.rows import Row, frame_of, read_rows
+from pcii.evaluation.rows import Row, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import (
     LOOK_AT_NO_PHOTON,
@@ -23,7 +25,8 @@ from pcii.evaluation.summary import (
     ranks,
     with_yardsticks,
 )
-from pcii.evaluation.tables import TITLES, Table, light_name, mean_table, rank_table
+from pcii.evaluation.tables import TITLES, light_name, mean_table, rank_table
+from pcii.figures.pages import NOT_KNOWN, render_page, text_table
 from pcii.store.collection import IN_FRAMES
 from pcii.store.folders import ROWS
 from pcii.store.verification import verify_scores
@@ -95,7 +98,7 @@ GEOMETRIC: Mapping[str, Kind] = {"median_px": "geometric"}
 
 
 def write_page(folder: Path, out: Path) -> int:
-    """Write the page of all submissions in a folder, each a folder of its own; returns how many there are.
+    """Write the page of all submissions in a folder, each a folder in it; returns how many there are.
 
     Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
     one name, a name that could be taken for another one, and submissions of several benchmarks.
@@ -118,42 +121,41 @@ def write_page(folder: Path, out: Path) -> int:
             if other != inside:
                 names = f"{other.name} and {inside.name}"
                 raise InputError(f"{folder}: {names} are both of {about.method!r}, in upper or lower case")
-        own = by_scene(read_rows(inside))
-        others = {row["method"] for row in own}.difference(about.methods)
-        if others:
+        new_rows = by_scene(read_rows(inside))
+        if unnamed := {row["method"] for row in new_rows}.difference(about.methods):
             raise InputError(
-                f"{inside / ROWS}: has rows of {min(others)!r}, which {SUBMISSION} does not name"
+                f"{inside / ROWS}: has rows of {min(unnamed)!r}, which {SUBMISSION} does not name"
             )
-        rows += own
+        rows += new_rows
     frame = with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
     first = next(iter(submissions.values()))
-    of_cells = means(frame)
+    cell_means = means(frame)
     content = {
         "benchmark": first.benchmark,
         "half": first.half,
         "yardsticks": ABOUT_YARDSTICKS,
         "scenes": of_scenes["scene"].nunique(),
-        "kinds": [
-            _compare(comparison, of_cells)
+        "comparisons": [
+            _compare(comparison, cell_means)
             for comparison in COMPARISONS
-            if comparison.measure in set(of_cells["measure"])
+            if comparison.measure in set(cell_means["measure"])
         ],
-        "ranks": [_ranks(of_scenes, measure, title) for measure, title in TITLES.items()],
+        "ranks": dict(_ranks(of_scenes, measure) for measure in TITLES),
         "machines": _machines(rows),
         "submissions": _submission_table(submissions, frame),
     }
-    write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
+    write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
 
 
-def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
+def _compare(comparison: Comparison, cell_means: "DataFrame") -> dict[str, Any]:
     """What the page says of methods by one measure, from the means of `summary.means`."""
     import pandas as pd
 
     measure = comparison.measure
-    values = _values(comparison, of_cells)
+    values = _values(comparison, cell_means)
     of_scenes = values[~values["scene"].astype(str).str.endswith(IN_FRAMES)]
     is_geometric = of_scenes["measure"].isin(list(GEOMETRIC))
     of_scenes = of_scenes.assign(mean=of_scenes["mean"].mask(is_geometric, of_scenes["mean"].clip(MIN_PX)))
@@ -165,64 +167,50 @@ def _compare(comparison: Comparison, of_cells: "DataFrame") -> dict[str, Any]:
     columns = [*map(light_name, accuracy["light"].unique()), *times["column"].unique()]
     by_light["column"] = pd.Categorical(by_light["column"], columns)
     at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
-    return {
-        "title": comparison.title,
-        "words": comparison.words,
-        "plot": accuracy_plot(over_scenes, list(values["method"].cat.categories), measure),
-        "table": mean_table(
-            "By photons per view",
-            by_light,
-            ["method"],
-            "column",
-            full_n=of_scenes["scene"].nunique(),
-            bound=comparison.bound,
-        ),
-        "by_scene": mean_table(
-            f"By scene, at {TYPICAL_PHOTONS:g} photons per view",
-            at_typical,
-            ["scene"],
-            "method",
-            bound=comparison.bound,
-        ),
-    }
+    tables: dict[str, DataFrame] = {}
+    scenes, bound = of_scenes["scene"].nunique(), comparison.bound
+    if len(by_light):
+        title = "By photons per view"
+        tables[title] = mean_table(by_light, ["method"], "column", full_n=scenes, bound=bound)
+    if len(at_typical):
+        title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
+        tables[title] = mean_table(at_typical, ["scene"], "method", bound=bound)
+    chart = accuracy_plot(over_scenes, list(values["method"].cat.categories), measure)
+    return {"title": comparison.title, "words": comparison.words, "chart": chart, "tables": tables}
 
 
-def _values(comparison: Comparison, of_cells: "DataFrame") -> "DataFrame":
+def _values(comparison: Comparison, cell_means: "DataFrame") -> "DataFrame":
     """Means of the measure, photons and seconds of the methods that have it, the bound as the last method."""
     import pandas as pd
 
-    def of(*measures: str) -> "DataFrame":
-        return of_cells[of_cells["measure"].isin(measures)]
+    def means_of(*measures: str) -> "DataFrame":
+        return cell_means[cell_means["measure"].isin(measures)]
 
-    has_measure = of(comparison.measure)[["scene", "light", "method"]]
-    values = of(comparison.measure, "photons_per_view", "seconds").merge(has_measure)
-    methods = sorted(has_measure["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
-    bounds = of(comparison.bound_measure).merge(has_measure).drop_duplicates(["scene", "light"], keep="last")
+    cells = means_of(comparison.measure)[["scene", "light", "method"]]
+    values = means_of(comparison.measure, "photons_per_view", "seconds").merge(cells)
+    methods = sorted(cells["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
+    bounds = means_of(comparison.bound_measure).merge(cells).drop_duplicates(["scene", "light"], keep="last")
     if len(bounds):
-        photons = of("photons_per_view").merge(bounds[["scene", "light", "method"]])
+        photons = means_of("photons_per_view").merge(bounds[["scene", "light", "method"]])
         bounds = pd.concat([bounds.assign(measure=comparison.measure), photons])
         values = pd.concat([values, bounds.assign(method=comparison.bound)])
         methods.append(comparison.bound)
     return values.assign(method=pd.Categorical(values["method"], methods))
 
 
-def _ranks(frame: "DataFrame", measure: str, title: str) -> Table:
+def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
     unit = ranked_over(frame, measure)
-    return rank_table(ranks(frame, measure), f"{title} over all {unit}", unit)
+    return f"{TITLES[measure]} over all {unit}", rank_table(ranks(frame, measure), unit)
 
 
 def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
     """Methods by the machines that their seconds are of."""
-    methods: dict[str, list[str]] = {}
-    for row in rows:
-        known = methods.setdefault(row.get("machine", ""), [])
-        if row["method"] not in known:
-            known.append(row["method"])
-    return {machine: sorted(names) for machine, names in sorted(methods.items()) if machine}
+    pairs = sorted({(row["machine"], row["method"]) for row in rows if row.get("machine")})
+    return {machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))}
 
 
-def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> Table:
-    """Whose each method is, and the command that measures it again, in a folder of its own."""
+def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> "DataFrame":
+    """The authors of each method, and the command that measures it again, each into another folder."""
     scores = frame.drop_duplicates(["method", "identity", "light"])["method"].value_counts()
     rows = []
     for folder, about in submissions.items():
@@ -234,15 +222,7 @@ def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "Data
             is_known = name in known_methods() or ":" in (estimator_of(name) or name)
             if about.is_run and not is_known:
                 command = "no method of this name is installed"
-            rows.append(
-                (
-                    method,
-                    about.authors or "–",
-                    about.url or "–",
-                    about.trained_on or "–",
-                    str(scores[method]),
-                    command,
-                )
-            )
+            texts = (text or NOT_KNOWN for text in (about.authors, about.url, about.trained_on))
+            rows.append((method, *texts, str(scores[method]), command))
     header = ("method", "authors", "url", "trained on", "scores", "command")
-    return Table("Submissions", header, tuple(sorted(rows)), words=4)
+    return text_table(sorted(rows), header, words=4)

@@ -1,7 +1,7 @@
 """Scores of a method on the public benchmark: of one that is run here, or of maps that were made elsewhere.
 
-Both are an evaluation with a submission.json beside it, which says whose they are.
-Photons, frames and full light of a scene are datasets of their own, and one scene in the frame.
+Both are an evaluation with a submission.json, which names the authors.
+Photons, frames and full light of a scene are separate datasets, and one scene in the frame.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,10 +13,11 @@ from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.comparison import Evaluation
-from pcii.evaluation.measurement import EvaluationJob, measure
+from pcii.evaluation.evaluation_page import write_evaluation
+from pcii.evaluation.frames import frame_of
+from pcii.evaluation.measurement import EvaluationJob, Task, measure, tasks_of
 from pcii.evaluation.method_names import named_method
-from pcii.evaluation.pages import write_evaluation
-from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
+from pcii.evaluation.rows import Row, origin_of, writing_rows
 from pcii.evaluation.submissions import (
     RUN,
     SCORED,
@@ -26,7 +27,6 @@ from pcii.evaluation.submissions import (
     read_submission,
     tasks_of_submission,
 )
-from pcii.evaluation.tasks import Task, tasks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.collection import (
     BENCHMARK_FIELDS,
@@ -62,21 +62,21 @@ class BenchmarkHalf:
 
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
-    """Open one half of a benchmark; `InputError` for a folder that is none, and if a dataset is damaged."""
+    """Open one half of a benchmark; `InputError` for another folder, and for a damaged dataset."""
     if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     recipe = read_collection(path).recipe
-    goes_on = f"the same `simgen benchmark make -o {path}` goes on with it"
+    advice = f"the same `simgen benchmark make -o {path}` goes on with it"
     if not (path / INDEX).is_file():
-        raise InputError(f"{path}: the benchmark is unfinished; {goes_on}")
+        raise InputError(f"{path}: the benchmark is unfinished; {advice}")
     collection = open_collection(path)
-    chosen: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
-    if not len(chosen):
-        raise InputError(f"{path}: has no dataset of the {half} half yet; {goes_on}")
-    datasets = list(chosen)
-    scenes = {row["path"]: row["values"]["name"] for row in chosen.rows}
-    lit = {scenes[each.name]: each for each in datasets if each.light == FULL_LIGHT}
-    full_light = {name: lit[scene] for name, scene in scenes.items() if scene in lit}
+    of_half: Collection = collection[[row["values"]["half"] == half for row in collection.rows]]
+    if not len(of_half):
+        raise InputError(f"{path}: has no dataset of the {half} half yet; {advice}")
+    datasets = list(of_half)
+    scenes = {row["path"]: row["values"]["name"] for row in of_half.rows}
+    bright = {scenes[each.name]: each for each in datasets if each.light == FULL_LIGHT}
+    full_light = {name: bright[scene] for name, scene in scenes.items() if scene in bright}
     scenes_of_half = [scene for scene in recipe["scene"] if scene["half"] == half]
     expected = sum(len(recipe["seeds"]) + bool(scene["frames"]) + 1 for scene in scenes_of_half)
     return BenchmarkHalf(recipe["name"], half, datasets, full_light, expected - len(datasets))
@@ -124,9 +124,9 @@ def run_method(
     for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_method(method)
-    whose = {name: text for name, text in about.items() if text}
-    whose |= {"benchmark": data.benchmark, "method": named.name, "half": data.half}
-    submission = validated(ScoredSubmission, whose | {"made": RUN, "command_name": method})
+    members = {name: text for name, text in about.items() if text}
+    members |= {"benchmark": data.benchmark, "method": named.name, "half": data.half}
+    submission = validated(ScoredSubmission, members | {"made": RUN, "command_name": method})
     requested = {str(Light.parse(each)) for each in budgets}
     tasks: list[Task] = []
     for dataset in data.datasets:
@@ -138,8 +138,8 @@ def run_method(
         if lights:
             tasks += tasks_of([dataset], [named], lights)
     if not tasks:
-        words = " or ".join(budgets) or "light that it takes"
-        raise InputError(f"budget: no dataset of the {data.half} half that {method!r} can take has {words}")
+        light = " or ".join(budgets) or "light that it takes"
+        raise InputError(f"budget: no dataset of the {data.half} half that {method!r} can take has {light}")
     return _score(BenchmarkJob(tasks, data), submission, out, executor, report)
 
 
@@ -173,8 +173,7 @@ def _score(
 ) -> Evaluation:
     """Measure what is missing, and write the evaluation with what there is to say about the submission."""
     with writing_rows(out) as file:
-        others = {row["method"] for row in file.rows.values()}.difference(submission.methods)
-        if others:
+        if others := {row["method"] for row in file.rows.values()}.difference(submission.methods):
             raise InputError(f"{out}: holds scores of {min(others)!r}; name another folder")
         made_again = measure(job, file, executor, report)
         write_json_safely(out / SUBMISSION, submission.model_dump(exclude_none=True))

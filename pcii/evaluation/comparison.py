@@ -10,12 +10,13 @@ from pcii.base.errors import InputError
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.evaluation import summary
-from pcii.evaluation.curves import draw_evaluation
-from pcii.evaluation.measurement import EvaluationJob, measure
+from pcii.evaluation.evaluation_page import AXES, ERRORS, accuracies, write_evaluation
+from pcii.evaluation.frames import frame_of
+from pcii.evaluation.measurement import EvaluationJob, measure, tasks_of
 from pcii.evaluation.method_names import Method, named_methods
-from pcii.evaluation.pages import write_evaluation
-from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
-from pcii.evaluation.tasks import tasks_of
+from pcii.evaluation.rows import key_of, origin_of, writing_rows
+from pcii.figures.charts import draw_accuracy, known_places
+from pcii.figures.panels import in_style, several_axes
 from pcii.store.collection import is_collection, read_index
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH
@@ -32,7 +33,7 @@ SEED = re.compile(r"(.*_)?seed_\d+")
 class Evaluation:
     """What was measured of methods on datasets.
 
-    `frame` has a row for each dataset, light, method and plane, or depth map; `pcii.evaluation.rows` lists
+    `frame` has a row for each dataset, light, method and plane, or depth map; `pcii.evaluation.frames` lists
     its columns. `made_again` is a sentence for each change of software for which earlier rows were measured
     again. `origin` says what measured the rows: versions, machines and days.
     """
@@ -45,7 +46,7 @@ class Evaluation:
     def means(self, by: Sequence[str] = summary.CELL) -> "DataFrame":
         """Means of every measure over datasets, with their 95 % intervals: see `summary.means`.
 
-        Beside methods they are of what looks at no photon: see `summary.YARDSTICKS`.
+        Methods are joined by yardsticks, which look at no photon: see `summary.YARDSTICKS`.
         """
         return summary.means(summary.with_yardsticks(self.frame), by)
 
@@ -63,9 +64,18 @@ class Evaluation:
         "median_px". Bars are 95 % intervals, over scenes or, of one scene, over its datasets.
         `style="paper"` is for print:
         `evaluation.plot("iou", style="paper")[0].figure.savefig("iou.pdf")`, or .svg. Raises `InputError` for
-        another measure or style, one that no method has, and axes that are none, or another number of them.
+        another measure or style, a measure that no method has, and other axes or another number of them.
         """
-        return draw_evaluation(self.means(), measure, axes, style=style)
+        if measure not in AXES:
+            raise InputError(f"measure: expected one of {', '.join(AXES)}, got {measure!r}")
+        cells = accuracies(summary.over_scenes(self.means()), measure)
+        if not (places := known_places(cells)):
+            raise InputError(f"measure: no method has {measure!r}")
+        methods = sorted(cells["method"].unique())
+        with in_style(style):
+            panels = several_axes(axes, len(places))
+            draw_accuracy(panels, cells, methods, AXES[measure], is_share=measure not in ERRORS)
+        return panels
 
 
 def evaluate(
@@ -82,8 +92,8 @@ def evaluate(
 
     `datasets` are dataset folders, collections, or folders of dataset folders. `methods` are those of
     `pcii.removal_methods()`, and those of `pcii.depth_methods()` as "depth:NAME"; "depth" is the default one
-    of depth; "module:function" or "file.py:function"; or functions of one's own: of removal, or of depth as
-    pairs ("depth:NAME", function), which are measured every time, since nobody knows what they follow from.
+    of depth; "module:function" or "file.py:function"; or functions: of removal, or of depth as pairs
+    ("depth:NAME", function), which are measured every time, since their source is not known.
     Without, all that can take the data. `budgets` default to all that each dataset has; among them
     "full-light", its radiance, which some methods of depth take. `z_mm` are depths to look at instead of
     those that recipes name. `executor` does the work.

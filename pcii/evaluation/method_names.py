@@ -1,7 +1,7 @@
-"""Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME.
+"""Methods of an evaluation by name: methods of removal by theirs, estimators of depth as depth:NAME.
 
-A function that nobody has registered is named "module:function" or "file.py:function", with "depth:" before
-it for depth; in Python it is given itself, or as a pair of a name and the function.
+A function that is not registered is named "module:function" or "file.py:function", with "depth:" before
+it for depth; in Python the function itself stands for it, or a pair of a name and the function.
 
 After `depth:` no name has a colon, so that a full name says which of the two a method is; and none has
 brackets, since tables name in parentheses what is no method.
@@ -31,7 +31,7 @@ Method = str | Function | tuple[str, Function]
 
 @dataclass(frozen=True)
 class NamedMethod:
-    """A method by its full name, and the function of one that nobody has registered.
+    """A method by its full name, and its function if it is not registered.
 
     `source` is the "module:function" or "file.py:function" that it was loaded from.
     """
@@ -110,12 +110,11 @@ def named_methods(methods: Sequence[Method]) -> list[NamedMethod]:
     >>> [method.name for method in named_methods(["depth", ("all", lambda counts, sections: None)])]
     ['depth:posterior', 'all']
     """
-    found: dict[str, NamedMethod] = {}
-    for each in methods:
-        method = named_method(each)
-        if found.setdefault(method.name, method) != method:
+    by_name: dict[str, NamedMethod] = {}
+    for method in map(named_method, methods):
+        if by_name.setdefault(method.name, method) != method:
             raise InputError(f"methods: {method.name!r} is there twice; give a pair (another name, function)")
-    return list(found.values())
+    return list(by_name.values())
 
 
 def named_method(method: Method) -> NamedMethod:
@@ -124,7 +123,8 @@ def named_method(method: Method) -> NamedMethod:
         name, function = method if isinstance(method, tuple) else (name_of(method), method)
         if not isinstance(name, str) or not callable(function):
             raise InputError(f"methods: expected names, functions, or pairs (name, function), got {method!r}")
-        return _checked(NamedMethod(name, function))
+        check_name(name, "methods")
+        return NamedMethod(name, function)
     if method == DEPTH:
         return NamedMethod(depth_name(DEFAULT_METHOD))
     if method in known_methods():
@@ -135,20 +135,16 @@ def named_method(method: Method) -> NamedMethod:
         known = ", ".join([DEPTH, *known_methods()])
         raise InputError(f"method: there is no method named {method!r}; use {known}, or module:function")
     function = load_function(source)
-    name = name_of(function)
-    return _checked(NamedMethod(name if estimator is None else depth_name(name), function, method))
-
-
-def _checked(method: NamedMethod) -> NamedMethod:
-    check_name(method.name, "methods")
-    return method
+    name = name_of(function) if estimator is None else depth_name(name_of(function))
+    check_name(name, "methods")
+    return NamedMethod(name, function, method)
 
 
 def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
     """Raise `InputError`, which begins with `label`, for a full name that could be taken for another one.
 
-    Beside what `is_plain_name` says, it has no colon but that of `depth:`, and no bracket. It differs from
-    those of known methods by more than case, or else, if it `may_be_known`, is one of them.
+    It is a name by `is_plain_name`, has no colon but that of `depth:`, and no bracket. It differs from those
+    of known methods by more than case, or else, if it `may_be_known`, is one of them.
     """
     short_name = name.removeprefix(_PREFIX)
     if not is_plain_name(short_name) or not short_name or _NOT_IN_NAMES & {*short_name}:

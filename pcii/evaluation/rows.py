@@ -1,18 +1,13 @@
-"""Rows of an evaluation: rows.jsonl, which grows while methods are measured, and the frame that they make.
+"""Rows of an evaluation: rows.jsonl, which grows while methods are measured.
 
-rows.jsonl has one JSON object for each dataset, light and method. What is measured again, since other
-software made it, is added below, and the last row counts.
-
-The frame (`frame_of`) has a row for each dataset, light, method and plane, or depth map. Its columns, which
-docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
-other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
-blur, `within_1px` and the other scores of depth, with dots for what is nested, `bound_px`.
+It has one JSON object for each dataset, light and method. What is measured again, since other software made
+it, is added below, and the last row counts.
 """
 
 import json
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -21,82 +16,36 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, Literal, NotRequired
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
-from pcii.store.dataset import Dataset
-from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_json
+from pcii.store.folders import EVALUATION_FOLDER, ROWS
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
     from pydantic import TypeAdapter
-
-    from pcii.store.manifests import DatasetManifest
 
 Row = dict[str, Any]
 Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
-NO_MEASURES = frozenset(HEAD)
-"""Columns of the frame that say of what a row is."""
-LIGHTS = ("photons.budget", "photons.nested")
-"""Settings that say in which light a scene is seen, and nothing of the scene; it is the `budget` of a row."""
-MAX_COLUMNS = 300
-"""Some three times what the measures need; a page takes 10 ms for each."""
+"""Columns of the frame of an evaluation that say of what a row is: no measure has such a name."""
 
 
-def identity_of(manifest: "DatasetManifest") -> str:
-    """Identity of a dataset: that in its manifest, else a hash of its files' hashes."""
-    return manifest.identity or hash_json(manifest.files)
-
-
-def recipe_of(manifest: "DatasetManifest") -> str:
-    """Hash of a dataset's recipe without its seed and its light, and of its scene.
-
-    Seeds and amounts of light of one scene share it.
-    """
-    recipe = {name: value for name, value in _leaves(manifest.recipe) if name not in ("seed", *LIGHTS)}
-    if not recipe:
-        return identity_of(manifest)[:16]
-    return hash_json({"recipe": recipe, "scene": manifest.get("scene")})[:16]
-
-
-def describe_dataset(dataset: Dataset, z_mm: Sequence[float]) -> Row:
-    """The fields of a row that describe its dataset, seen at the depths `z_mm` or, of none, at its own."""
-    manifest = dataset.manifest
-    recipe = manifest.recipe
-    row = {
-        "dataset": dataset.name,
-        "identity": identity_of(manifest),
-        "recipe": recipe_of(manifest),
-        "title": manifest.title or dataset.name,
-        "seed": recipe.get("seed"),
-        "settings": {
-            name: value for name, value in _leaves(recipe) if name not in ("title", "seed", *LIGHTS)
-        },
-    }
-    if z_mm:
-        row["z_mm"] = [*z_mm]
-        row["settings"]["analysis.z_mm"] = [*z_mm]
-        row["recipe"] = hash_json([row["recipe"], *z_mm])[:16]
-    return row
-
-
-def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Every value of nested tables by its dotted name, as `--set` takes it."""
     for name, value in table.items():
         if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{name}.")
+            yield from leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
 def _measures(scores: Any) -> Any:
     """Scores by their dotted names; raises ValueError for a name of another column of the frame."""
-    measures = dict(_leaves(scores)) if isinstance(scores, dict) else {}
-    if names := NO_MEASURES & measures.keys():
+    measures = dict(leaves(scores)) if isinstance(scores, dict) else {}
+    if names := {*HEAD} & measures.keys():
         raise ValueError(f"{min(names)!r} is no name of a measure")
     return measures or scores
 
 
-def _plane_parts(plane: Any) -> Any:
-    """A plane with its scores apart."""
+def plane_parts(plane: Mapping[str, Any]) -> Row:
+    """A plane with its scores as one member."""
     scores = dict(plane)
     parts = {name: scores.pop(name) for name in ("z_mm", "object", "truth") if name in scores}
     return parts | {"scores": scores}
@@ -137,7 +86,7 @@ def _row_model() -> "TypeAdapter[Any]":
         machine: NotRequired[Text]
         bound_px: NotRequired[float | None]
         depth: NotRequired[Annotated[dict[str, float | None], by_names]]
-        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
+        planes: NotRequired[list[Annotated[Plane, BeforeValidator(plane_parts)]]]
 
     return TypeAdapter(RowModel)
 
@@ -181,7 +130,7 @@ def writing_rows(out: Path) -> Iterator[RowFile]:
 
 
 def read_rows(out: Path) -> list[Row]:
-    """The last row of each key in a folder; `InputError` if there are none, and for a line that is no row."""
+    """The last row of each key in a folder; `InputError` without rows, and for a line that is no row."""
     rows = _parsed(out, (out / ROWS).read_bytes()) if (out / ROWS).is_file() else {}
     if not rows:
         raise InputError(f"{out}: holds no evaluation; `pcii evaluate` makes one")
@@ -203,96 +152,10 @@ def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
                 raise ValueError("no scores")
             rows[key_of(row)] = row
         except (ValueError, TypeError, RecursionError) as fault:
-            words = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
+            sentence = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
             advice = "delete that line and repeat the command that made it"
-            raise InputError(f"{out / ROWS}: line {number}: {words}; {advice}") from None
+            raise InputError(f"{out / ROWS}: line {number}: {sentence}; {advice}") from None
     return rows
-
-
-def read_frame(out: str | Path) -> "DataFrame":
-    """The frame of the evaluation in a folder; raises `InputError` as `read_rows` does."""
-    return frame_of(read_rows(Path(out)))
-
-
-def frame_of(rows: Sequence[Row]) -> "DataFrame":
-    """The frame of rows, whose columns the docstring of this module explains; scenes in their order."""
-    import pandas as pd
-
-    labels = _labels(rows)
-    records = [
-        {
-            "scene": labels[row["title"], row["recipe"]],
-            "light": "by exposure" if row["budget"] is None else row["budget"],
-        }
-        | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
-        | {"z_mm": None, "objects": None}
-        | {name: row.get(name) for name in ("photons_per_view", "seconds")}
-        | measured
-        for row in rows
-        for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
-    ]
-    if len(set().union(*records)) > MAX_COLUMNS:
-        raise InputError(
-            f"{ROWS}: expected the same measures in all rows, not more than {MAX_COLUMNS} different ones"
-        )
-    frame = pd.DataFrame(records, columns=None if records else [*HEAD])
-    texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
-    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
-    numbers = frame.columns.difference([*texts, "light"])
-    frame[numbers] = frame[numbers].astype("float64")
-    frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
-    # Numbers of photons, then an exposure, then full light.
-    lights = sorted(set(frame["light"]), key=lambda light: (isinstance(light, str), light))
-    frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
-    return frame
-
-
-def _encodable(text: str) -> str:
-    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
-    return text.encode(errors="backslashreplace").decode()
-
-
-def _of_depth(row: Row) -> Row:
-    return dict(_leaves(row["depth"])) | ({"bound_px": row["bound_px"]} if "bound_px" in row else {})
-
-
-def _of_planes(row: Row) -> Iterable[Row]:
-    """A record for each plane, with its scores against both kinds of truth."""
-    records: dict[float, Row] = {}
-    for plane in row["planes"]:
-        record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
-        words = ("z_mm", "object", "truth")
-        scores = dict(_leaves({name: value for name, value in plane.items() if name not in words}))
-        if plane["truth"] == "object":
-            record |= {"objects": plane["object"]} | scores
-        else:
-            record |= {f"pixel_{name}": scores[name] for name in scores}
-    return records.values()
-
-
-def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
-    """By title and recipe: the title, with the settings that distinguish it from others of the same title."""
-    settings: dict[str, dict[str, dict[str, str]]] = {}
-    for row in rows:
-        texts = {
-            name: value if isinstance(value, str) else json.dumps(value)
-            for name, value in row.get("settings", {}).items()
-        }
-        settings.setdefault(row["title"], {}).setdefault(row["recipe"], texts)
-    labels: dict[tuple[str, str], str] = {}
-    for title, by_recipe in settings.items():
-        names = dict.fromkeys(name for own in by_recipe.values() for name in own)
-        differing = [name for name in names if len({own.get(name) for own in by_recipe.values()}) > 1]
-        words = {
-            recipe: [f"{name}={own[name]}" for name in differing if name in own]
-            for recipe, own in by_recipe.items()
-        }
-        for recipe, own in words.items():
-            # A scene that was changed, or has no recipe, differs in no setting.
-            is_unique = len(words) == 1 or list(words.values()).count(own) == 1
-            parts = own if is_unique else [*own, f"recipe {recipe[:8]}"]
-            labels[title, recipe] = f"{title} ({', '.join(parts)})" if parts else title
-    return labels
 
 
 def origin_of(rows: Sequence[Row]) -> dict[str, Any]:

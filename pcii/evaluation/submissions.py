@@ -28,8 +28,8 @@ from pydantic import (
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import is_plain, web_address
+from pcii.evaluation.measurement import Task
 from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of
-from pcii.evaluation.tasks import Task
 from pcii.store.collection import Half
 from pcii.store.dataset import Dataset
 from pcii.store.manifests import first_fault
@@ -42,7 +42,7 @@ DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
 MIN_MM, MAX_MM = 1e-3, 1e12
 """Nearest and farthest depth of an answer: errors of others overflow."""
 MAX_OVERHEAD_BYTES = 1 << 16
-"""Size of a submission.json at most, and of what an .npz file has beside its numbers."""
+"""Largest size of a submission.json, and of all but the numbers in an .npz file."""
 Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
 RUN, SCORED = get_args(Made)
 
@@ -161,10 +161,9 @@ def tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) 
                 f"{file}: is no result of this half; expected files DATASET/LIGHT/{DEPTH_MAP} or {MASKS}"
             )
     tasks = {file: possible[file] for file in possible if file in present}
-    others = [*folder.glob("[!.]*"), *folder.glob("*/[!.]*")]
-    names = [str(file.relative_to(folder)) for file in sorted(others) if not file.is_dir()]
-    if unused := ", ".join(name for name in names if name != SUBMISSION):
-        warnings.warn(f"{folder}: not used: {unused}", stacklevel=2)
+    others = sorted({*folder.glob("[!.]*"), *folder.glob("*/[!.]*")} - {folder / SUBMISSION})
+    if names := ", ".join(str(file.relative_to(folder)) for file in others if not file.is_dir()):
+        warnings.warn(f"{folder}: not used: {names}", stacklevel=2)
     if not tasks:
         raise InputError(f"{folder}: has no results of a dataset of this half")
     kinds = {(task.light, task.method.name) for task in tasks.values()}
@@ -203,16 +202,16 @@ def _read_arrays(folder: Path, file: Path, shapes: Mapping[str, tuple[int, ...]]
     """Arrays of an .npz file with these shapes, the first of which is needed; else raises `InputError`."""
     numbers = sum(map(math.prod, shapes.values()))
     _check_file(folder, file, MAX_OVERHEAD_BYTES + 16 * numbers)  # those of long doubles
-    needed, *_ = shapes
+    first, *_ = shapes
     described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-    expected = f"expected numbers {described}, of which {needed} is needed"
+    expected = f"expected numbers {described}, of which {first} is needed"
     try:
         with ZipFile(file) as archive:
             members = {name.removesuffix(".npy"): name for name in archive.namelist()}
-            if unused := members.keys() - shapes:
-                raise InputError(f"{file}: {min(unused)!r} is not used; {expected}")
+            if others := members.keys() - shapes:
+                raise InputError(f"{file}: {min(others)!r} is not used; {expected}")
             headers = {name: _header(archive, member) for name, member in members.items()}
-            if needed not in headers or any(headers[name] != (shapes[name], True) for name in headers):
+            if first not in headers or any(headers[name] != (shapes[name], True) for name in headers):
                 raise InputError(f"{file}: {expected}")
             return {name: _read_array(archive, members[name]) for name in members}
     except InputError:

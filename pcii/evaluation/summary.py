@@ -1,6 +1,6 @@
 """Means of an evaluation with their intervals, and comparisons of methods on the same datasets.
 
-All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
+All are of `Evaluation.frame` (see `pcii.evaluation.frames`). Datasets that differ in seed and amount of light
 alone are one scene.
 """
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.evaluation.rows import HEAD, NO_MEASURES
+from pcii.evaluation.rows import HEAD
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -141,13 +141,13 @@ def with_yardsticks(frame: "DataFrame") -> "DataFrame":
         prefix: {name: name.replace(f"{prefix}.", "") for name in columns if f"{prefix}." in name}
         for prefix in YARDSTICKS
     }
-    parts = [frame.drop(columns=[name for own in names.values() for name in own])]
-    for prefix, own in names.items():
-        known = frame[[*keys, *own]].dropna(how="all", subset=[*own])
-        known = known.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=own)
-        nothing = known.assign(method=NOTHING)
-        nothing[[*own.values()]] *= 0.0
-        parts += [known.assign(method=YARDSTICKS[prefix]), nothing]
+    parts = [frame.drop(columns=[name for measures in names.values() for name in measures])]
+    for prefix, measures in names.items():
+        scores = frame[[*keys, *measures]].dropna(how="all", subset=[*measures])
+        scores = scores.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=measures)
+        nothing = scores.assign(method=NOTHING)
+        nothing[[*measures.values()]] *= 0.0
+        parts += [scores.assign(method=YARDSTICKS[prefix]), nothing]
     return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
 
 
@@ -159,7 +159,7 @@ def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
     import pandas as pd
 
     keys = [*by, "seed", "identity"]
-    measures = [column for column in frame.columns if column not in NO_MEASURES]
+    measures = [column for column in frame.columns if column not in HEAD]
     values = frame[[*keys, *measures]].groupby(keys, observed=True, dropna=False).mean()
     parts = [
         _group_means(values[measure], by, kind_of(measure), measure)
@@ -169,7 +169,7 @@ def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
     return pd.concat(parts, ignore_index=True)
 
 
-def means_over_scenes(of_cells: "DataFrame", kinds: Mapping[str, Kind]) -> "DataFrame":
+def means_over_scenes(cell_means: "DataFrame", kinds: Mapping[str, Kind]) -> "DataFrame":
     """Means over scenes of the means of `means`, by light and method, with the same columns.
 
     Intervals are of the spread between scenes. `kinds` are those of measures that do not have `kind_of`.
@@ -177,10 +177,10 @@ def means_over_scenes(of_cells: "DataFrame", kinds: Mapping[str, Kind]) -> "Data
     import pandas as pd
 
     by = ["light", "method"]
-    values = of_cells.set_index([*by, "scene"]).sort_index()
+    values = cell_means.set_index([*by, "scene"]).sort_index()
     parts = [
-        _group_means(own["mean"], by, kinds.get(str(measure), kind_of(str(measure))), str(measure))
-        for measure, own in values.groupby("measure", sort=False)
+        _group_means(cells["mean"], by, kinds.get(str(measure), kind_of(str(measure))), str(measure))
+        for measure, cells in values.groupby("measure", sort=False)
     ]
     return pd.concat(parts, ignore_index=True)
 
@@ -199,13 +199,13 @@ def _group_means(values: "Series", by: Sequence[str], kind: Kind, measure: str) 
     return table.assign(mean=ends[:, 0], low=ends[:, 1], high=ends[:, 2])
 
 
-def over_scenes(of_cells: "DataFrame") -> "DataFrame":
+def over_scenes(cell_means: "DataFrame") -> "DataFrame":
     """Means by light and method from those of `means`: over scenes, and of one scene over its datasets."""
-    return of_cells if of_cells["scene"].nunique() < MIN_SCENES else means_over_scenes(of_cells, {})
+    return cell_means if cell_means["scene"].nunique() < MIN_SCENES else means_over_scenes(cell_means, {})
 
 
 def ranked_over(frame: "DataFrame", measure: str) -> Over:
-    """What methods are ranked over if nothing is said: scenes, and of one scene its datasets."""
+    """What methods are ranked over by default: scenes, or the datasets of a single scene."""
     scenes = frame["scene"][frame[measure].notna()].nunique() if measure in frame else 0
     return "datasets" if scenes < MIN_SCENES else "scenes"
 
@@ -232,8 +232,8 @@ def ranks(frame: "DataFrame", measure: str, over: Over | None = None) -> "DataFr
         raise InputError("over: one scene has no spread over scenes; use over='datasets'")
     key = "scene" if (over or possible) == "scenes" else "identity"
     tables = [pd.DataFrame(columns=["light", "method"])]
-    known = frame[frame[measure].notna()] if measure in frame else frame[:0]
-    for light, at_light in known.groupby("light", observed=True):
+    has_measure = frame[frame[measure].notna()] if measure in frame else frame[:0]
+    for light, at_light in has_measure.groupby("light", observed=True):
         keys = list(dict.fromkeys([key, "seed", "identity"]))
         values = at_light.pivot_table(measure, keys, "method", observed=True, dropna=False, sort=True)
         values = values.dropna().groupby(level=key, observed=True).mean()
@@ -244,7 +244,7 @@ def ranks(frame: "DataFrame", measure: str, over: Over | None = None) -> "DataFr
         order = np.argsort(-score, kind="stable")
         x = x[order]
         table = pd.DataFrame({"light": light, "method": values.columns[order]})
-        table["rank"] = [1 + int((score > own).sum()) for own in score[order]]
+        table["rank"] = [1 + int((score > mean).sum()) for mean in score[order]]
         table["n"] = x.shape[1]
         table[["mean", "low", "high"]] = np.stack(_intervals(x, kind_of(measure)), axis=-1)
         ends = ["difference", "difference_low", "difference_high"]

@@ -1,12 +1,10 @@
-"""Tables of an evaluation as text, the same for HTML and Markdown."""
+"""Tables of means and ranks as texts, for pages of an evaluation and for terminals."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.base.plain_text import in_markdown
 from pcii.depth.methods import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.summary import (
@@ -18,6 +16,7 @@ from pcii.evaluation.summary import (
     ranked_over,
     ranks,
 )
+from pcii.figures.pages import NOT_KNOWN, emphasised, text_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -56,30 +55,7 @@ DEPTH = {
 }
 """The same of depth."""
 MAX_DETAILED_SCENES = 12
-"""Largest number of scenes with tables of all measures: those of more make a page that nobody can load."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of text: title, names of the columns, rows; the first `words` columns are left-aligned.
-
-    `best` are cells (row, column) to stand out.
-    """
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    words: int = 1
-    best: frozenset[tuple[int, int]] = frozenset()
-
-
-def markdown(table: Table) -> str:
-    """The table in Markdown, without its title."""
-    rule = [":--" if column < table.words else "--:" for column in range(len(table.header))]
-    rows = [[in_markdown(cell) for cell in row] for row in (table.header, *table.rows)]
-    for row, column in table.best:
-        rows[1 + row][column] = f"**{rows[1 + row][column]}**"
-    return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
+"""Largest number of scenes with tables of all measures: a page with those of more is too large to load."""
 
 
 def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
@@ -89,7 +65,7 @@ def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
     ('0.912 (0.905 to 0.919)', '0.912')
     """
     if np.isnan(mean):
-        return "–"
+        return NOT_KNOWN
     text = f"{mean:.{digits}f}"
     return text if np.isnan(low) else f"{text} ({low:.{digits}f} to {high:.{digits}f})"
 
@@ -103,27 +79,28 @@ def light_name(light: float | str) -> str:
     return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
 
 
-def tables_of(frame: "DataFrame", of_cells: "DataFrame") -> Iterator[Table]:
+def tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
     """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
 
-    `frame` is of `summary.with_yardsticks`, `of_cells` its means by scene, light and method.
+    Each has its title. `frame` is of `summary.with_yardsticks`, `cell_means` its means by scene, light and
+    method.
     """
     for (decisive, title), names in zip(TITLES.items(), (REMOVAL, DEPTH), strict=True):
-        means = of_cells[of_cells["measure"] == decisive]
+        means = cell_means[cell_means["measure"] == decisive]
         if not len(means):
             continue
         ranked = ranks(frame, decisive)
         if len(ranked):
             unit = ranked_over(frame, decisive)
-            yield rank_table(ranked, f"{title}, methods compared on the same {unit}", unit)
-        yield mean_table(f"{title} by photons per view", means, ["scene", "method"], "light", light_name)
+            yield f"{title}, methods compared on the same {unit}", rank_table(ranked, unit)
+        yield f"{title} by photons per view", mean_table(means, ["scene", "method"], "light", light_name)
         if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
-            yield _measure_table(f"{title} beside other measures", of_cells, means, names)
+            yield f"{title} beside other measures", _measure_table(cell_means, means, names)
 
 
-def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
+def decisive_means(cell_means: "DataFrame") -> Iterator[tuple[str, str]]:
     """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
-    means = over_scenes(of_cells)
+    means = over_scenes(cell_means)
     for measure, title in TITLES.items():
         of_measure = means[means["measure"] == measure]
         if len(of_measure):
@@ -132,37 +109,35 @@ def decisive_means(of_cells: "DataFrame") -> Iterator[tuple[str, str]]:
             )
             table = table.rename(columns={light: light_name(light) for light in table.columns})
             table.index.name = table.columns.name = None
-            yield title, table.to_string(float_format="{:.3f}".format, na_rep="–")
+            yield title, table.to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
 
 
-def _measure_table(title: str, of_cells: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> Table:
+def _measure_table(cell_means: "DataFrame", means: "DataFrame", names: Mapping[str, str]) -> "DataFrame":
     """The measures `names` of the methods in `means`, by scene, light and method."""
     import pandas as pd
 
-    shown = of_cells[
-        of_cells["measure"].isin(list(names)) & of_cells["method"].isin(means["method"].unique())
-    ]
+    is_shown = cell_means["measure"].isin(list(names)) & cell_means["method"].isin(means["method"].unique())
+    shown = cell_means[is_shown]
     shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
-    return mean_table(title, shown, ["scene", "light", "method"], "measure", lambda name: names[name])
+    return mean_table(shown, ["scene", "light", "method"], "measure", lambda name: names[name])
 
 
 def mean_table(
-    title: str,
     means: "DataFrame",
     rows: Sequence[str],
     column: str,
     name: Callable[[Any], str] = str,
     full_n: int = 0,
     bound: str = "",
-) -> Table:
+) -> "DataFrame":
     """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
 
     Of `MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where another
     is worse, and `NOT_BETTER` marks methods that are no better than the best of `SIMPLE`; `bound`
-    names what is no method. Where a mean is of fewer than `full_n` values their number is said.
+    names what is no method. Means of fewer than `full_n` values have their number.
     """
-    if not len(means):
-        return Table(title, (), ())
+    import pandas as pd
+
     contest = [key for key in ("scene", "light", "measure") if key in means]
     methods = means["method"].astype(object)
     is_simple = methods.isin(SIMPLE)
@@ -173,25 +148,20 @@ def mean_table(
 
     is_best = (values == best_of(values)) & (values > -best_of(-values))
     is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
-    texts = [
-        with_interval(row.mean, row.low, row.high)
-        + (f" of {row.n}" if row.n < full_n else "")
-        + (f" {NOT_BETTER}" if row.is_marked else "")
-        for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_marked=is_marked))
-    ]
-    cells = means.assign(text=texts, is_best=is_best)
-    cells = cells.pivot(index=list(rows), columns=column, values=["text", "is_best"])
-    shown = cells["text"].sort_index(axis="columns").fillna("–")
-    marked = np.argwhere(cells["is_best"].sort_index(axis="columns").eq(True).to_numpy())
-    index = shown.index.to_frame()
-    if "light" in index:
-        index["light"] = [light_name(light) for light in index["light"]]
-    lines = map(tuple, np.hstack([index.to_numpy(object), shown.to_numpy(object)]).tolist())
-    best = frozenset((int(row), len(rows) + int(number)) for row, number in marked)
-    return Table(title, (*rows, *map(name, shown.columns)), tuple(lines), len(rows), best)
+    texts: list[str] = []
+    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
+        number = f" of {row.n}" if row.n < full_n else ""
+        text = with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
+        texts.append(emphasised(text) if row.is_best else text)
+    cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
+    table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
+    table = table.fillna(NOT_KNOWN).set_axis([*map(name, table.columns)], axis="columns").reset_index()
+    if "light" in table:
+        table["light"] = [*map(light_name, table["light"])]
+    return table.set_index([*rows])
 
 
-def rank_table(table: "DataFrame", title: str, unit: Over = "scenes") -> Table:
+def rank_table(table: "DataFrame", unit: Over) -> "DataFrame":
     """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
     rows = [
         (
@@ -200,10 +170,10 @@ def rank_table(table: "DataFrame", title: str, unit: Over = "scenes") -> Table:
             str(row.rank),
             with_interval(row.mean, row.low, row.high),
             with_interval(row.difference, row.difference_low, row.difference_high),
-            *("–" if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
+            *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
             str(row.n),
         )
         for row in lines_of(table)
     ]
     header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible", unit)
-    return Table(title, header, tuple(rows))
+    return text_table(rows, header)

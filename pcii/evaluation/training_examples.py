@@ -1,4 +1,4 @@
-"""Examples to train on: parts of the films of datasets, in a random pose, with light that is drawn anew.
+"""Examples to train on: parts of the films of datasets, in a random pose and in light drawn at each access.
 
 All of it is exact. Photons that are kept at random are Poisson counts of less light. Where a film is mirrored
 or transposed its cameras are too, and so are its Bayer pattern, pitch and shear, so that disparities stay.
@@ -8,6 +8,7 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -75,7 +76,7 @@ def examples(
 
 @dataclass(eq=False)
 class Examples(Sequence[Example]):
-    """A sequence with one example for each dataset. Each access opens a dataset of a collection anew."""
+    """A sequence with one example for each dataset. Each access opens its dataset again."""
 
     datasets: Sequence[Dataset]
     fields: tuple[Field, ...]
@@ -87,9 +88,9 @@ class Examples(Sequence[Example]):
     epoch: int = 0
 
     def __post_init__(self) -> None:
-        known = get_args(Field)
-        if not self.fields or not {*self.fields} <= {*known}:
-            raise InputError(f"fields: expected some of {', '.join(known)}, got {self.fields}")
+        fields = get_args(Field)
+        if not self.fields or not {*self.fields} <= {*fields}:
+            raise InputError(f"fields: expected some of {', '.join(fields)}, got {self.fields}")
         if isinstance(self.planes, int) and self.planes < 2:
             raise InputError(f"planes: expected at least 2, or depths in mm, got {self.planes}")
         if self.photons is not None and not 0 < self.photons[0] <= self.photons[1] < math.inf:
@@ -104,7 +105,7 @@ class Examples(Sequence[Example]):
         dataset = self.datasets[number]
         entropy = None if self.seed is None else (self.seed, self.epoch, number % len(self))
         rng = np.random.default_rng(entropy)
-        pose = _Pose.drawn(dataset.grid, self.crop_px, self.poses, rng)
+        pose = _Pose.random(dataset.grid, self.crop_px, self.poses, rng)
         planes = self._planes_of(dataset, pose.of_grid(dataset.grid))
         example: Example = {}
         if {*self.fields} - {"truth"}:
@@ -141,7 +142,7 @@ class _Pose:
     is_transposed: bool
 
     @classmethod
-    def drawn(
+    def random(
         cls, grid: CameraGrid, crop_px: tuple[int, int] | None, poses: bool, rng: np.random.Generator
     ) -> "_Pose":
         height, width = crop_px or grid.shape_HW
@@ -173,8 +174,8 @@ class _Pose:
         grid, events = counts.grid, counts.events
         (top, left), (height, width) = self.corner, self.size
         i, j = events.i - top, events.j - left
-        here = (i >= 0) & (i < height) & (j >= 0) & (j < width)
-        k, l, i, j, n = (column[here] for column in (events.k, events.l, i, j, events.n))
+        is_inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+        k, l, i, j, n = (column[is_inside] for column in (events.k, events.l, i, j, events.n))
         if 0 in self.flips:
             k, i = grid.rows - 1 - k, height - 1 - i
         if 1 in self.flips:
@@ -216,8 +217,8 @@ def _thinned(
     assert most is not None
     if photons[0] > most:
         raise InputError(f"{dataset.path}: has {most:.4g} photons per view, fewer than photons[0] asks for")
-    wanted = math.exp(rng.uniform(*np.log(photons)))
-    return counts.subsample(counts.total * min(wanted / most, 1.0), rng)
+    target = math.exp(rng.uniform(*np.log(photons)))
+    return counts.subsample(counts.total * min(target / most, 1.0), rng)
 
 
 def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
@@ -247,29 +248,25 @@ def _of_split(
         raise InputError(
             f"split, by: expected one of {', '.join(SPLITS)}, and scene or seed, got {split}, {by}"
         )
-    if isinstance(data, Collection):
-        keys = [{"scene": (row["scene"], row["scene_number"]), "seed": row["seed"]} for row in data.rows]
-        splits = [row["split"] for row in data.rows]
-    else:
-        recipes = [dataset.manifest.recipe for dataset in data]
-        keys = [{"scene": (r.get("scene"), r.get("scene_number")), "seed": r.get("seed")} for r in recipes]
-        splits = [None] * len(keys)
+    is_collection = isinstance(data, Collection)
+    rows = data.rows if is_collection else [dict(dataset.manifest.recipe) for dataset in data]
+    splits = [row["split"] if is_collection else None for row in rows]
     if shares is not None:
         if min(shares) < 0 or not math.isclose(sum(shares), 1, abs_tol=1e-6):
             raise InputError(f"shares: expected three shares that sum to 1, got {shares}")
         ends = np.cumsum(shares)
-        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key[by]), "right")), 2)] for key in keys]
+        of_scene = by == "scene"
+        keys = [(r.get("scene"), r.get("scene_number")) if of_scene else r.get("seed") for r in rows]
+        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key), "right")), 2)] for key in keys]
     elif None in splits:
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
     mask = [each == split for each in splits]
     if not any(mask):
         other = "scene" if by == "seed" else "seed"
         raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by={other!r}")
-    if isinstance(data, Collection):
-        return data[mask]
-    return [dataset for dataset, is_wanted in zip(data, mask, strict=True) if is_wanted]
+    return data[mask] if is_collection else [*compress(data, mask)]
 
 
 def _hashed(key: object) -> float:
-    """A number from 0 to 1 that a key has everywhere."""
+    """A number from 0 to 1 that is the same for a key on every machine."""
     return int.from_bytes(hashlib.sha256(repr(key).encode()).digest()[:8], "big") / 2**64

@@ -1,4 +1,4 @@
-"""Every drawing: 8-bit pictures of arrays, and what Matplotlib draws for `.plot()`, pages and notebooks.
+"""Every drawing: 8-bit pictures of arrays, what Matplotlib draws for `.plot()` and notebooks, and pages.
 
 Functions take plain arrays; one module knows by the name of a type what of it is worth a picture. So this
 room comes before `types`.

@@ -33,22 +33,6 @@ def quiet_grid(axes: "Axes") -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _draw_reliability(axes: "Axes", bins: "pd.DataFrame", style: Mapping[str, Any]) -> None:
-    """Share of correct answers against stated confidence, bins with larger markers the more they hold.
-
-    Confidence that is right lies on the diagonal, too much of it below (Naeini, Cooper and Hauskrecht 2015).
-    """
-    stated, correct = bins["confidence"], bins["correct"]
-    areas = MIN_AREA + WHOLE_AREA * bins["share"]
-    marks = {"color": style["color"], "marker": style["marker"], "alpha": 0.8, "linewidth": 0}
-    axes.scatter(stated, correct, areas, clip_on=False, zorder=3, **marks)
-    axes.plot(stated, correct, linewidth=1.0, color=style["color"], linestyle=style["linestyle"])
-    axes.plot([0, 1], [0, 1], color=GRID_COLOUR, linewidth=0.8)
-    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-    axes.set(xlabel="stated confidence", ylabel="share within 1 px")
-    quiet_grid(axes)
-
-
 def accuracy_chart(
     means: "pd.DataFrame", methods: Sequence[str], label: str, *, is_share: bool
 ) -> "Figure | None":
@@ -78,23 +62,21 @@ def draw_accuracy(
     to those: the difference may be that of the scenes. What is no share from 0 to 1 has a logarithmic axis.
     Full light is at no number of photons. `panels` are axes, one for each of `known_places`, of one figure.
     """
-    handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the two
+    handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the panels
     for axes, place in zip(panels, known_places(means), strict=True):
         rows, has_fewer = means[means[place].notna()], False
         for number, method in enumerate(methods):
-            own = rows[rows["method"] == method]
-            if own.empty:
-                continue
+            of_method = rows[rows["method"] == method]
             style = _line_style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
             if place == "seconds":  # they hardly follow the light, so that a line would go to and fro
                 style["linestyle"] = "none"
-            for n, part in own.groupby("n"):
-                is_whole = n == own["n"].max()
+            for n, part in of_method.groupby("n"):
+                is_whole = n == of_method["n"].max()
                 face = {} if is_whole else {"markerfacecolor": "none"}
                 bars = np.maximum(0, [part["mean"] - part["low"], part["high"] - part["mean"]])
-                drawn = axes.errorbar(part[place], part["mean"], yerr=bars, **style, **face)
+                handle = axes.errorbar(part[place], part["mean"], yerr=bars, **style, **face)
                 if is_whole:
-                    handles[plot_label(method)] = drawn
+                    handles[plot_label(method)] = handle
                 has_fewer |= not is_whole
         axes.set_xlabel(PLACES[place] + (" (hollow: fewer scenes)" if has_fewer else ""))
         if is_share:
@@ -126,7 +108,8 @@ def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":
     """Share of correct depths against their stated confidence, a reliability diagram for each light.
 
     `bins` has a row for each bin of confidence that has pixels: `method`, `light`, `confidence`, `correct`,
-    and its `share` of the pixels. Methods have the colours of `accuracy_chart`.
+    and its `share` of the pixels, by which markers are larger. Confidence that is right lies on the diagonal,
+    too much of it below (Naeini, Cooper and Hauskrecht 2015). Methods have the colours of `accuracy_chart`.
     """
     from matplotlib.lines import Line2D
 
@@ -136,8 +119,17 @@ def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":
     figure = new_figure(0.7 + 2.45 * columns, 0.7 + 2.6 * lines, "constrained")
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     for light, axes in zip(lights, panels.flat, strict=False):
-        for method, own in bins[bins["light"] == light].groupby("method", sort=False):
-            _draw_reliability(axes, own, _line_style(methods.index(str(method))))
+        for method, of_method in bins[bins["light"] == light].groupby("method", sort=False):
+            style = _line_style(methods.index(str(method)))
+            stated, correct = of_method["confidence"], of_method["correct"]
+            marks = {"color": style["color"], "marker": style["marker"], "alpha": 0.8, "linewidth": 0}
+            areas = MIN_AREA + WHOLE_AREA * of_method["share"]
+            axes.scatter(stated, correct, areas, clip_on=False, zorder=3, **marks)
+            axes.plot(stated, correct, linewidth=1.0, color=style["color"], linestyle=style["linestyle"])
+        axes.plot([0, 1], [0, 1], color=GRID_COLOUR, linewidth=0.8)
+        axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+        axes.set(xlabel="stated confidence", ylabel="share within 1 px")
+        quiet_grid(axes)
         axes.set_title(light, fontsize=9)
         axes.label_outer()
     for axes in panels.flat[len(lights) :]:

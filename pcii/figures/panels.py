@@ -1,7 +1,6 @@
-"""Axes to draw in, pictures over the pixels of a view, colour bars, and scale bars for print."""
+"""Figures and axes to draw in, colour bars, and figures as files."""
 
 import io
-import math
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -35,8 +34,6 @@ LABELS_IN = 0.9
 DOTS_PER_INCH = 110
 MAX_NAME_LENGTH = 40
 """Characters of a name, about a third of a plot's width."""
-SCALE_BAR_SHARE = 0.3
-"""A scale bar is at most so long, as a share of the picture's width."""
 
 
 def plot_label(name: str) -> str:
@@ -85,8 +82,8 @@ def several_axes(
     height, width = (PANEL_IN * side / max(shape) for side in shape)
     size = columns * (max(width, PANEL_IN / 2) + LABELS_IN), rows * (max(height, PANEL_IN / 3) + LABELS_IN)
     figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
-    for unused in grid.flat[count:]:
-        figure.delaxes(unused)
+    for spare in grid.flat[count:]:
+        figure.delaxes(spare)
     return grid.ravel()[:count]
 
 
@@ -100,38 +97,16 @@ def new_figure(width_in: float, height_in: float, layout: Literal["compressed", 
     return figure
 
 
-def figure_bytes(figure: "Figure") -> bytes:
-    """A figure as PNG."""
-    stored = io.BytesIO()
-    figure.savefig(stored, format="png")
-    return stored.getvalue()
+def figure_bytes(figure: "Figure", dots_per_inch: float | Literal["figure"] = "figure") -> bytes:
+    """A figure as PNG, by default with the dots per inch that it was made for."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots_per_inch)
+    return buffer.getvalue()
 
 
 def figure_uri(figure: "Figure") -> str:
     """A figure as a data URI of a PNG for HTML."""
     return uri_of("png", figure_bytes(figure))
-
-
-def show_picture(
-    axes: "Axes",
-    image: np.ndarray,
-    shape_HW: Sequence[int],
-    title: str,
-    block_px: float = 1.0,
-) -> None:
-    """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
-
-    `shape_HW` is that of a view; blocks that reach over it are cut off.
-    """
-    height, width = shape_HW
-    bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
-    axes.imshow(image, extent=(-0.5, right, bottom, -0.5))
-    axes.set_xlim(-0.5, width - 0.5)
-    axes.set_ylim(height - 0.5, -0.5)
-    axes.set_title(title)
-    axes.set_xlabel("column (px)")
-    axes.set_ylabel("row (px)")
-    axes.locator_params(integer=True, nbins=6)
 
 
 def colour_bar_uri(colours: str, limits: tuple[float, float], label: str) -> str:
@@ -151,44 +126,7 @@ def colour_scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
     return ScalarMappable(Normalize(*limits), colours)
 
 
-def draw_scale_bar(axes: "Axes", mm_per_px: float | None) -> None:
-    """In place of axes in pixels a bar of a round length, in mm, or px where a pixel's size is unknown."""
-    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
-
-    hide_frame(axes)
-    left, right = axes.get_xlim()
-    px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
-    longest = SCALE_BAR_SHARE * (right - left) / px
-    decade = 10.0 ** math.floor(math.log10(longest))
-    length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
-    place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}
-    looks = {"color": "black", "frameon": False, "pad": 0.0, "borderpad": 0.0, "sep": 3}
-    looks |= {"size_vertical": 0.01 * (right - left), "fill_bar": True}
-    axes.add_artist(AnchoredSizeBar(axes.transData, length * px, f"{length:g} {unit}", **place, **looks))
-
-
 def hide_frame(axes: "Axes") -> None:
     """No ticks, no labels and no lines around a picture."""
     axes.set(xticks=[], yticks=[], xlabel="", ylabel="")
     axes.spines[:].set_visible(False)
-
-
-def draw_outline(axes: "Axes", mask: np.ndarray, shape_HW: Sequence[int], colour: str) -> None:
-    """Draw the outline of a mask (H, W) along the sides of its voxels, which may be finer than pixels."""
-    from matplotlib.collections import LineCollection
-
-    side = shape_HW[0] / mask.shape[0]
-    padded = np.pad(mask, 1)
-    rows, cols = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])  # a line above voxel (row, col)
-    lines = [np.stack([cols, rows, cols + 1, rows], axis=-1)]
-    rows, cols = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])  # a line to the left of it
-    lines.append(np.stack([cols, rows, cols, rows + 1], axis=-1))
-    segments = np.concatenate(lines).reshape(-1, 2, 2) * side - 0.5
-    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=1.0), autolim=False)
-
-
-def write_in_middle(axes: "Axes", text: str) -> None:
-    """A sentence where there is nothing to draw."""
-    box = {"boxstyle": "round", "facecolor": "white", "edgecolor": GRID_COLOUR}
-    place = {"transform": axes.transAxes, "ha": "center", "va": "center"}
-    axes.text(0.5, 0.5, text, color="black", bbox=box, **place)

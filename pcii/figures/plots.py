@@ -5,30 +5,35 @@ Matplotlib `axes` that it gets, by default of a new figure, and returns them as 
 panel.
 """
 
-import base64
-import io
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import in_html
-from pcii.figures.exposure import PANEL_PX, block_px, exposed, photon_picture
 from pcii.figures.panels import (
     COLOURS,
+    GRID_COLOUR,
     MAX_PANELS,
     colour_scale,
-    draw_outline,
-    draw_scale_bar,
+    figure_bytes,
     hide_frame,
     in_style,
     plot_label,
     several_axes,
-    show_picture,
-    write_in_middle,
 )
-from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image
+from pcii.figures.pictures import (
+    DEPTH_COLOURS,
+    NO_ANSWER,
+    PANEL_PX,
+    block_px,
+    depth_image,
+    exposed,
+    photon_picture,
+    uri_of,
+)
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
@@ -42,9 +47,11 @@ MIN_DEPTH_SPAN_MM = 1.0
 OBJECT_COLOURS, OBJECT_COLOUR_COUNT = "tab20", 20
 """Colour map of Matplotlib for objects, and its colours, which further objects have again."""
 MAX_NAMES = 40
-"""Objects that are named beside a picture: the largest."""
+"""Largest number of objects whose names stand at a picture: those of the largest objects."""
 NAME_LINES = 16
 """Names in a column."""
+SCALE_BAR_SHARE = 0.3
+"""Longest scale bar as a share of the picture's width."""
 
 
 def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any) -> np.ndarray:
@@ -57,7 +64,7 @@ def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any)
         panels = DRAWINGS[type(value).__name__](value, axes, **options)
         if style == "paper":
             for panel, mm_per_px in zip(panels, _pixel_sizes_mm(value, len(panels)), strict=True):
-                draw_scale_bar(panel, mm_per_px)
+                _draw_scale_bar(panel, mm_per_px)
     return panels
 
 
@@ -74,14 +81,14 @@ def picture_html(value: Any) -> str:
     """The line of a value and its drawing, in HTML; without a picture if its data cannot be read."""
     from matplotlib import pyplot
 
-    line, png = f"<pre>{in_html(repr(value))}</pre>", io.BytesIO()
+    line = f"<pre>{in_html(repr(value))}</pre>"
     try:
         figure = draw(value)[0].figure
     except (InputError, OSError):
         return line
-    figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
+    picture = uri_of("png", figure_bytes(figure, PICTURE_DOTS_PER_INCH))
     pyplot.close(figure)
-    return f'{line}<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
+    return f'{line}<img src="{picture}">'
 
 
 def draw_counts(counts: Any, axes: Any, view: Any = None) -> np.ndarray:
@@ -91,7 +98,7 @@ def draw_counts(counts: Any, axes: Any, view: Any = None) -> np.ndarray:
     step_px = block_px(image.shape, PANEL_PX)
     panels = several_axes(axes, 1, image.shape)
     title = f"view ({k}, {l}), photons: {image.sum()}"
-    show_picture(panels[0], photon_picture(image, step_px), image.shape, title, step_px)
+    _show_picture(panels[0], photon_picture(image, step_px), image.shape, title, step_px)
     return panels
 
 
@@ -102,7 +109,7 @@ def draw_views(views: Any, axes: Any, view: Any = None) -> np.ndarray:
     step_px = block_px(shape_HW, PANEL_PX)
     panels = several_axes(axes, 1, shape_HW)
     (image,) = exposed([views.in_colours(k, l)], step_px)
-    show_picture(panels[0], image, shape_HW, f"view ({k}, {l})", step_px)
+    _show_picture(panels[0], image, shape_HW, f"view ({k}, {l})", step_px)
     return panels
 
 
@@ -132,14 +139,9 @@ def draw_sections(sections: Any, axes: Any, focus: Any = None) -> np.ndarray:
         if focus is not None:
             mask = focus.in_focus[plane]
             title = f"{z_mm[plane]:.5g} mm: {mask.mean():.1%} in focus\n{plot_label(focus.method)}"
-            draw_outline(panel, mask, shape_HW, COLOURS[4])
-        show_picture(panel, image, shape_HW, title, step * shape_HW[0] / voxels[0])
+            _draw_outline(panel, mask, shape_HW, COLOURS[4])
+        _show_picture(panel, image, shape_HW, title, step * shape_HW[0] / voxels[0])
     return panels
-
-
-def draw_masks(focus: Any, axes: Any) -> np.ndarray:
-    """Each section after removal with the outline of its mask."""
-    return draw_sections(focus.sections, axes, focus)
 
 
 def draw_depth(depth: Any, axes: Any, z_range_mm: tuple[float, float] | None = None) -> np.ndarray:
@@ -160,10 +162,10 @@ def draw_truth(truth: Any, axes: Any, z_range_mm: tuple[float, float] | None = N
 
 def depth_limits_mm(z_mm: np.ndarray) -> tuple[float, float] | None:
     """Near and far end of a scale that holds all but outlying depths; None without depths."""
-    known = z_mm[np.isfinite(z_mm)]
-    if not known.size:
+    known_mm = z_mm[np.isfinite(z_mm)]
+    if not known_mm.size:
         return None
-    near, far = np.quantile(known, [OUTLIER_SHARE, 1 - OUTLIER_SHARE])
+    near, far = np.quantile(known_mm, [OUTLIER_SHARE, 1 - OUTLIER_SHARE])
     middle, half = (near + far) / 2, max((far - near) / 2, MIN_DEPTH_SPAN_MM / 2)
     return float(middle - half), float(middle + half)
 
@@ -178,10 +180,10 @@ def _draw_depths(
     """Depth (H, W) in mm with a colour bar, near is bright: paler where less sure, grey without an answer."""
     limits = z_range_mm or depth_limits_mm(z_mm)
     if limits is None:
-        show_picture(axes, np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape))
-        write_in_middle(axes, "no depth is known")
+        _show_picture(axes, np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape))
+        _write_in_middle(axes, "no depth is known")
         return
-    show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
+    _show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
     figure = axes.get_figure(root=True)
     assert figure is not None
     bar = figure.colorbar(colour_scale(DEPTH_COLOURS, limits), ax=axes, label="depth z (mm)")
@@ -189,7 +191,7 @@ def _draw_depths(
 
 
 def _draw_objects(axes: "Axes", truth: Any) -> None:
-    """Objects in colours, grey where none is; the names of the largest stand beside the picture."""
+    """Objects in colours, grey without an object; the names of the largest stand to the right."""
     from matplotlib import colormaps
     from matplotlib.patches import Patch
 
@@ -198,10 +200,10 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
     image = np.full((*truth.object_id.shape, 3), NO_ANSWER, np.uint8)
     for number, colour in zip(ids, colours, strict=True):
         image[truth.object_id == number] = np.round(255 * colour)
-    show_picture(axes, image, truth.object_id.shape, "objects")
+    _show_picture(axes, image, truth.object_id.shape, "objects")
     hide_frame(axes)
     if not ids.size:
-        write_in_middle(axes, "no object is seen")
+        _write_in_middle(axes, "no object is seen")
         return
     largest = np.sort(np.argsort(-sizes, kind="stable")[:MAX_NAMES])
     patches = [Patch(color=tuple(colours[n]), label=plot_label(truth.names[int(ids[n])])) for n in largest]
@@ -209,11 +211,70 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
     axes.legend(handles=patches, frameon=False, fontsize="small", **place)
 
 
+def _show_picture(
+    axes: "Axes",
+    image: np.ndarray,
+    shape_HW: Sequence[int],
+    title: str,
+    block_px: float = 1.0,
+) -> None:
+    """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
+
+    `shape_HW` is that of a view; blocks that reach over it are cut off.
+    """
+    height, width = shape_HW
+    bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
+    axes.imshow(image, extent=(-0.5, right, bottom, -0.5))
+    axes.set_xlim(-0.5, width - 0.5)
+    axes.set_ylim(height - 0.5, -0.5)
+    axes.set_title(title)
+    axes.set_xlabel("column (px)")
+    axes.set_ylabel("row (px)")
+    axes.locator_params(integer=True, nbins=6)
+
+
+def _draw_outline(axes: "Axes", mask: np.ndarray, shape_HW: Sequence[int], colour: str) -> None:
+    """Draw the outline of a mask (H, W) along the sides of its voxels, which may be finer than pixels."""
+    from matplotlib.collections import LineCollection
+
+    side = shape_HW[0] / mask.shape[0]
+    padded = np.pad(mask, 1)
+    rows, cols = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])  # a line above voxel (row, col)
+    lines = [np.stack([cols, rows, cols + 1, rows], axis=-1)]
+    rows, cols = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])  # a line to the left of it
+    lines.append(np.stack([cols, rows, cols, rows + 1], axis=-1))
+    segments = np.concatenate(lines).reshape(-1, 2, 2) * side - 0.5
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=1.0), autolim=False)
+
+
+def _draw_scale_bar(axes: "Axes", mm_per_px: float | None) -> None:
+    """In place of axes in pixels a bar of a round length, in mm, or px where a pixel's size is unknown."""
+    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+    hide_frame(axes)
+    left, right = axes.get_xlim()
+    px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
+    longest = SCALE_BAR_SHARE * (right - left) / px
+    decade = 10.0 ** math.floor(math.log10(longest))
+    length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
+    place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}
+    looks = {"color": "black", "frameon": False, "pad": 0.0, "borderpad": 0.0, "sep": 3}
+    looks |= {"size_vertical": 0.01 * (right - left), "fill_bar": True}
+    axes.add_artist(AnchoredSizeBar(axes.transData, length * px, f"{length:g} {unit}", **place, **looks))
+
+
+def _write_in_middle(axes: "Axes", text: str) -> None:
+    """A sentence where there is nothing to draw."""
+    box = {"boxstyle": "round", "facecolor": "white", "edgecolor": GRID_COLOUR}
+    place = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+    axes.text(0.5, 0.5, text, color="black", bbox=box, **place)
+
+
 DRAWINGS: dict[str, Callable[..., np.ndarray]] = {
     "PhotonCounts": draw_counts,
     "Views": draw_views,
     "Sections": draw_sections,
-    "Segmented": draw_masks,
+    "Segmented": lambda focus, axes: draw_sections(focus.sections, axes, focus),
     "DepthMap": draw_depth,
     "Truth": draw_truth,
 }

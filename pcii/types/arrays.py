@@ -22,8 +22,8 @@ MOST_DEPTHS = 10_000
 """Longest list of depths, typed or stored; a longer one is taken for an error."""
 
 
-class Drawn(ShortForm):
-    """A type that `pcii.figures.plots` draws: `plot` in axes, and a picture in notebooks."""
+class Plottable(ShortForm):
+    """A type of which `pcii.figures.plots` draws values: `plot` in axes, and a picture in notebooks."""
 
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, **options: Any) -> np.ndarray:
         """Draw into Matplotlib `axes`, one for each panel, and return them as an array (N,).

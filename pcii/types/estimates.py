@@ -8,13 +8,13 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.types.arrays import Drawn, read_only
+from pcii.types.arrays import Plottable, read_only
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.section_stack import Sections
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segmented(Drawn):
+class Segmented(Plottable):
     """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
 
     `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
@@ -55,7 +55,7 @@ class Segmented(Drawn):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthMap(Drawn):
+class DepthMap(Plottable):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
     `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the

@@ -7,7 +7,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import times
-from pcii.types.arrays import Drawn, read_only
+from pcii.types.arrays import Plottable, read_only
 from pcii.types.bayer import check_cfa, colours_and_samples
 from pcii.types.camera_grid import CameraGrid
 
@@ -22,7 +22,7 @@ class ArrayLike5D(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Views(Drawn):
+class Views(Plottable):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel

@@ -16,7 +16,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.types.arrays import Drawn, is_whole, read_only, whole_counts
+from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
 from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid
 
@@ -117,7 +117,7 @@ PLAIN = Readout()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhotonCounts(Drawn):
+class PhotonCounts(Plottable):
     """Photon counts of every elemental image, as sparse events or as a dense stack, without ground truth.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the

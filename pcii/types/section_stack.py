@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import listed, times
-from pcii.types.arrays import Drawn, read_only
+from pcii.types.arrays import Plottable, read_only
 from pcii.types.bayer import by_colour, check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
@@ -19,7 +19,7 @@ Shifts = Literal["nearest", "even"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sections(Drawn):
+class Sections(Plottable):
     """Sections of the scene at `planes`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons, real

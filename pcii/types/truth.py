@@ -8,7 +8,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import listed, span, times
-from pcii.types.arrays import Drawn, read_only
+from pcii.types.arrays import Plottable, read_only
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 """Maps that a dataset may lack."""
@@ -30,7 +30,7 @@ class PhotonTruth:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Truth(Drawn):
+class Truth(Plottable):
     """Surfaces in the image of the virtual centre camera, from first hits of rays through pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the

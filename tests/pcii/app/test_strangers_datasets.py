@@ -82,7 +82,7 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     photons = np.random.default_rng(3).poisson(wall)
     save_dataset(tmp_path / "wall", PhotonCounts.from_dense(photons, GRID))
     assert run("run", tmp_path / "wall", "-o", tmp_path / "seen", *found[4:-2]) == 0
-    (depths,) = re.findall(r"looking at ([\d., ]+) mm, where the depth map has most", capsys.readouterr().out)
+    (depths,) = re.findall(r"the depth map has most surfaces at ([\d., ]+) mm;", capsys.readouterr().out)
     assert min(abs(float(text) - 500) for text in depths.split(",")) < 30
     command = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, "--z-mm", 600]
     assert run(*command, *fast) == 0

@@ -12,8 +12,7 @@ from pcii.app import commands as cli
 from pcii.app import load_estimates
 from pcii.base import InputError, command_line
 from pcii.depth import estimate_depth
-from pcii.evaluation import evaluate, named_methods, read_rows
-from pcii.evaluation.tasks import tasks_of
+from pcii.evaluation import evaluate, named_methods, read_rows, tasks_of
 from pcii.metrics import object_bounds
 from pcii.removal import removal_methods
 from pcii.sections import reconstruct

@@ -21,8 +21,7 @@ from pcii.figures import (
     accuracy_chart,
     calibration_chart,
     depth_image,
-    encoded,
-    filled_means,
+    exposed,
     smoothed,
     smoothing_for,
 )
@@ -167,12 +166,12 @@ def test_few_photons_of_a_bright_scene_are_smoothed_until_they_are_bright(per_pi
     counts = np.random.default_rng(3).poisson(per_pixel / 3, (200, 240, 3))
     samples = np.ones_like(counts)
     sigma = smoothing_for([counts, counts])
-    sums, weights = smoothed(counts, samples, sigma)
-    (image,) = encoded([(filled_means(sums, weights), weights)])
+    (image,) = exposed([(counts, samples)], 1, sigma)
     assert np.median(image) > 150
-    (raw,) = encoded([(counts / samples, samples)])
+    (raw,) = exposed([(counts, samples)], 1)
     assert np.median(raw) == 0
-    # Its noise is that of the 80 photons which are said to be under the Gaussian.
+    # Its noise is that of the photons which are said to be under the Gaussian.
+    sums, _ = smoothed(counts, samples, sigma)
     middle = sums[40:-40, 40:-40].sum(axis=-1)  # some 150 independent places at the fewest photons
     assert middle.std() / middle.mean() == pytest.approx(80**-0.5, rel=0.25)
 

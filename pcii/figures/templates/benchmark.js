@@ -6,7 +6,7 @@
     const number = Number.parseFloat(text);
     return Number.isNaN(number) ? (text === "–" ? null : text) : number;
   };
-  for (const table of document.querySelectorAll("table.sorted")) {
+  for (const table of document.querySelectorAll(".sorted table")) {
     const heads = [...table.rows[0].cells];
     heads.forEach((head, column) => {
       const button = document.createElement("button");
