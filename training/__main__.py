@@ -43,7 +43,7 @@ def main() -> None:
     parser.add_argument("--anew", action="store_true", help="start from random weights")
     parser.add_argument("--recipes", type=Path, default=RECIPES, help="folder of other recipes")
     arguments = parser.parse_args()
-    out, executor = arguments.out / "training", Executor(arguments.workers)
+    out, executor = arguments.out / "depth-network", Executor(arguments.workers)
     with Stages() as report:
         recipes = sorted(arguments.recipes.glob("*.toml"))
         collections = make_datasets(recipes, out / "datasets", executor, report)
