@@ -9,7 +9,7 @@ from tiny import TINY_RECIPE
 collect_ignore = ["simgen/importing/by_blender"]
 """Blender runs the script that exports its scene; it is no module of the tests."""
 
-settings.register_profile("fast", max_examples=25, deadline=None)
+settings.register_profile("fast", max_examples=15, deadline=None)
 settings.register_profile("stress", max_examples=10_000, deadline=None)
 settings.load_profile("fast")  # unless --hypothesis-profile names another
 

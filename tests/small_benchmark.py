@@ -7,7 +7,7 @@ import tomli_w
 
 from simgen.dataset import Definition, load_definition
 
-SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
+SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 66, "grid.width": 70, "grid.pixel_mm": 0.5}
 SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
 DEFINITION: dict[str, Any] = {
     "name": "small",

@@ -1,28 +1,19 @@
 """A dataset of two textured planes, one above the other, rendered with NumPy from the pinhole's equation."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pcii.store import (
-    RADIANCE,
-    TRUTH,
-    list_files,
-    radiance_name,
-    write_arrays_safely,
-    write_exr_safely,
-    write_manifest,
-)
-from pcii.types import TRUTH_LABELS, CameraGrid, mosaic
+from pcii.store import save_dataset
+from pcii.types import CameraGrid, Truth, Views, mosaic
 
 ABOVE_MM, BELOW_MM = 500.0, 800.0
 
 
-def plane_z_mm(grid: CameraGrid, k: float, l: float, below_mm: float = BELOW_MM) -> np.ndarray:
+def plane_z_mm(grid: CameraGrid, k: float, l: float) -> np.ndarray:
     """Depth (H, W) that camera (k, l) sees: the near plane is at Y < 0, above."""
-    return np.where(_position_mm(grid, k, l, ABOVE_MM)[1] < 0, ABOVE_MM, below_mm)
+    return np.where(_position_mm(grid, k, l, ABOVE_MM)[1] < 0, ABOVE_MM, BELOW_MM)
 
 
 def _position_mm(grid: CameraGrid, k: float, l: float, z_mm: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -48,36 +39,11 @@ def view(grid: CameraGrid, k: int, l: int) -> np.ndarray:
     return image
 
 
-def write_planes(
-    root: Path,
-    grid: CameraGrid,
-    cfa: str | None = None,
-    *,
-    below_mm: float = BELOW_MM,
-    view_truth: bool = False,
-    **members: Any,
-) -> Path:
-    """A dataset of radiance, a mosaic if there is a pattern, and truth; `members` are of its manifest.
-
-    With `below_mm` = infinity the truth says that there is no plane below.
-    """
-    root.mkdir()
-    for k, l in np.ndindex(grid.rows, grid.cols):
-        image = view(grid, k, l)
-        stored = image if cfa is None else mosaic(image, cfa)[..., None]
-        write_exr_safely(root / radiance_name(k, l), stored)
-    z_mm = plane_z_mm(grid, (grid.rows - 1) / 2, (grid.cols - 1) / 2, below_mm)
-    arrays = {"z_mm": z_mm, "object_id": np.where(z_mm == ABOVE_MM, 1, 2).astype(np.int16)}
-    if view_truth:
-        every = [[plane_z_mm(grid, k, l) for l in range(grid.cols)] for k in range(grid.rows)]
-        arrays["view_z_mm"] = np.array(every)
-    write_arrays_safely(root / TRUTH, arrays, TRUTH_LABELS)
-    manifest = {
-        "grid": asdict(grid),
-        "cfa": cfa,
-        "objects": {"1": "above", "2": "below"},
-        "radiance_channels": 3 if cfa is None else 1,
-        "files": list_files(root, [TRUTH, RADIANCE]),
-    }
-    write_manifest(root, manifest | members)
-    return root
+def write_planes(root: Path, grid: CameraGrid, cfa: str | None = None, *, view_truth: bool = False) -> Path:
+    """A dataset of radiance, a mosaic if there is a pattern, and truth, with `view_truth` of every view."""
+    images = np.array([[view(grid, k, l) for l in range(grid.cols)] for k in range(grid.rows)])
+    views = Views(images if cfa is None else mosaic(images, cfa)[..., None], grid, cfa)
+    z_mm = plane_z_mm(grid, (grid.rows - 1) / 2, (grid.cols - 1) / 2)
+    truth = Truth(z_mm, np.where(z_mm == ABOVE_MM, 1, 2), {1: "above", 2: "below"})
+    every = [[plane_z_mm(grid, k, l) for l in range(grid.cols)] for k in range(grid.rows)]
+    return save_dataset(root, views, truth, view_z_mm=np.array(every) if view_truth else None).path

@@ -2,17 +2,14 @@
 
 import html
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from report_outcomes import COUNTS, FOUND, GRID, IDS, TRUTH, Written, outcome_of, page_of
+from report_outcomes import GRID, IDS, TRUTH, Written, outcome_of, page_of
 
 from pcii.app import Outcome
-from pcii.app.report_pictures import MAX_SLIDER_PLANES, block_estimates, depth_errors, slider_planes
-from pcii.sections import reconstruct
-from pcii.types import CameraGrid, PhotonCounts, Truth, total_disparity_px
+from pcii.types import CameraGrid, PhotonCounts, Truth
 
 
 def words_of(page: str) -> str:
@@ -31,22 +28,10 @@ def page(reports: dict[str, Written]) -> str:
     return reports["full"].page
 
 
-@pytest.mark.parametrize("z_mm", [(500.0,), tuple(np.linspace(400, 900, 40))])
-def test_planes_of_the_slider(full: Outcome, z_mm: tuple[float, ...]) -> None:
-    z_range_mm = min(z_mm) * 0.8, max(z_mm) * 1.25
-    planes = slider_planes(replace(full, sections=reconstruct(COUNTS, z_mm), z_range_mm=z_range_mm))
-    assert 2 <= len(planes) <= MAX_SLIDER_PLANES
-    np.testing.assert_allclose(planes.z_mm[[0, -1]], z_range_mm)
-    steps = -np.diff(total_disparity_px(GRID, planes.z_mm))
-    np.testing.assert_allclose(steps, steps[0])
-    assert steps[0] > 0.49  # no two planes look the same
-
-
 def test_one_camera_has_one_section_for_all_depths(tmp_path: Path) -> None:
     grid = CameraGrid(rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid)
     outcome = outcome_of(tmp_path / "d", counts, None, (500,))
-    assert slider_planes(outcome).z_mm.tolist() == [500]
     assert 'id="plane"' not in page_of(outcome, tmp_path)
 
 
@@ -94,30 +79,3 @@ def test_hardly_any_photons_and_no_objects_divide_nothing(
     words = words_of(page_of(outcome_of(tmp_path / "d", counts, truth), tmp_path))
     assert f"{photons} photon{'s' * (photons != 1)} in all" in words
     assert "nan" not in words
-
-
-def test_colours_without_samples_are_those_around() -> None:
-    """A uniform grey scene has no tint at a depth at which all shifts are even."""
-    grid = CameraGrid(rows=3, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=16, width=16)
-    sections = reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid, cfa="GRBG"), 2500)
-    assert (sections.coverage[0, 6:10, 6:10] == 0).any()
-    for step in (1, 2, 3):
-        ((estimate, _),) = block_estimates(sections, step)
-        np.testing.assert_allclose(estimate[3:-3, 3:-3] if step == 1 else estimate[2:-2, 2:-2], 1)
-
-
-def test_errors_of_depth_and_their_scale() -> None:
-    error, limit = depth_errors(FOUND, TRUTH.object_z_mm)
-    expected = np.where(IDS > 0, np.broadcast_to(np.linspace(-3, 5, 48), IDS.shape), np.nan)
-    np.testing.assert_allclose(error, expected, atol=1e-9)
-    assert 0.9 < (np.abs(error[np.isfinite(error)]) <= limit).mean() <= 1
-
-
-def test_tables_can_be_scrolled_by_keyboard_and_pictures_have_words(page: str) -> None:
-    tables = re.findall(r"<div class=\"wide\"([^>]*)>\s*<table", page)
-    assert len(tables) == page.count("<table")
-    assert all('tabindex="0"' in each and "aria-label" in each for each in tables)
-    pictures = re.findall(r"<img [^>]*>", page)
-    assert len(pictures) > 15
-    assert all(re.search(r' alt="[^"]+"', each) for each in pictures)
-    assert '<html lang="en">' in page

@@ -1,6 +1,5 @@
 """The folder of results: what comes back, through failures, damage and other writers."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from twins import unit_grid
 from pcii.app import load_estimates, save_depth, save_sections, save_segmented
 from pcii.app.results import writing
 from pcii.sections import reconstruct
-from pcii.store import RESULTS, RESULTS_FOLDER, Dataset, DatasetManifest, read_results, verify
+from pcii.store import RESULTS, Dataset, DatasetManifest, read_results, verify
 from pcii.types import DepthMap, PhotonCounts, Segmented
 
 GRID = unit_grid(2, 2, 6, 7)
@@ -132,17 +131,6 @@ def test_damage_is_found_on_reading(saved: Path, tmp_path: Path, part: str) -> N
     assert "SHA-256" in one_sentence(lambda: load_estimates(saved, dataset_of(tmp_path)), file)
     file.unlink()  # a missing chunk is no empty mask
     assert "missing" in one_sentence(lambda: load_estimates(saved, dataset_of(tmp_path)), file)
-
-
-def test_versions_of_other_software_stay_until_all_is_made_anew(saved: Path, tmp_path: Path) -> None:
-    content = json.loads((saved / RESULTS).read_text())
-    now, content["versions"]["numpy"] = content["versions"]["numpy"], "1.0"
-    del content["sha256"]
-    RESULTS_FOLDER.write(saved, content)
-    save(saved, dataset_of(tmp_path), 0.9)
-    assert read_results(saved).versions["numpy"] == f"1.0, {now}"
-    save(saved, dataset_of(tmp_path), 0.9, whole=True)
-    assert read_results(saved).versions["numpy"] == now
 
 
 def test_xarray_opens_results_with_named_axes_and_units(tmp_path: Path) -> None:

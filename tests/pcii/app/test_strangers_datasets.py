@@ -42,9 +42,6 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
     assert run("score", tmp_path / "d", tmp_path / "out") == 0
     assert ("has no truth" in capsys.readouterr().out) == (truth is None)
     assert verify(tmp_path / "out") > 5
-    if "depth" in has:
-        score = json.loads((tmp_path / "out" / "score.json").read_text())
-        assert score["depth"]["hci"]["badpix_007"] is not None
 
 
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
@@ -58,8 +55,6 @@ def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys
     assert "Figure 7" not in page
     assert "<h2>Depth" in page
     assert verify(out) > 3
-    assert run("reconstruct", tmp_path / "d", "-o", tmp_path / "sections", "--z-mm", 600) == 0
-    assert (tmp_path / "sections" / "section_600mm.png").is_file()
 
 
 @pytest.mark.parametrize("command", [["segment"], ["run", "--method", "posterior"]])
@@ -107,12 +102,9 @@ def depth(data, z_range_mm):
 """
 
 
-@pytest.mark.parametrize("place", ["own_methods_1:", "{}/own_methods_2.py:"])
-def test_methods_are_functions_of_modules_and_files(tmp_path: Path, monkeypatch, capsys, place: str) -> None:
-    place = place.format(tmp_path / "methods")
-    for folder, number in ((tmp_path, 1), (tmp_path / "methods", 2)):
-        folder.mkdir(exist_ok=True)
-        (folder / f"own_methods_{number}.py").write_text(METHODS)
+def test_methods_are_functions_of_files(tmp_path: Path, monkeypatch) -> None:
+    place = f"{tmp_path / 'own_methods_2.py'}:"
+    (tmp_path / "own_methods_2.py").write_text(METHODS)
     monkeypatch.chdir(tmp_path)
     save_dataset("d", COUNTS, Truth(Z_MM, IDS, {1: "ball"}), z_mm=500)
     methods = ["--method", f"{place}remove", "--depth-method", f"{place}depth"]
@@ -123,8 +115,3 @@ def test_methods_are_functions_of_modules_and_files(tmp_path: Path, monkeypatch,
     scores = [json.loads(Path(out, "score.json").read_text()) for out in ("all", "steps")]
     assert scores[0] == scores[1]
     assert {row["method"] for row in scores[0]["planes"]} == {"mine"}
-    assert (
-        run("evaluate", "d", "-o", "e", "--method", f"{place}remove", "--method", f"depth:{place}depth") == 0
-    )
-    assert run("segment", "d", "-o", "no", "--method", f"{place}nothing") == 2
-    assert "nothing' cannot be loaded" in capsys.readouterr().err

@@ -209,9 +209,3 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"scheduler: Dask is not installed; .* pip install '\.\[cluster\]'"):
         list(Executor(scheduler="tcp://127.0.0.1:9").run(Numbers(tmp_path), range(2)))
-
-
-@pytest.mark.parametrize("arguments", [(0,), (2, "tcp://here")])
-def test_executors_that_make_no_sense_are_refused(arguments: tuple[Any, ...]) -> None:
-    with pytest.raises(InputError, match=r"^workers: "):
-        Executor(*arguments)

@@ -47,7 +47,6 @@ def test_a_function_of_a_file_or_a_module_is_a_method(
     ("name", "sentence"),
     [
         ("own_numbers.py:nothing", r"AttributeError: .*nothing"),
-        ("missing.py:remove", "ModuleNotFoundError: .*missing"),
         ("json.py:dumps", r"a module of the name 'json' is at .*rename the file"),
         ("own_numbers.py:number", "is int, which cannot be called"),
     ],

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from twins import even_light, intersection_over_union, unit_grid
 
-from pcii.baselines.simple_removals import sum_modified_laplacian
 from pcii.removal import segment
 from pcii.types import PhotonCounts
 
@@ -44,21 +43,3 @@ def test_sharpness_beside_brightness_is_better_than_brightness(two_squares):
         assert here > intersection_over_union(simple[plane], mask) + 0.05
         # The planted fault: the sign of the shifts reversed.
         assert intersection_over_union(wrong[plane], mask) < here / 2
-
-
-def test_modified_laplacian_of_a_point_and_of_a_slope():
-    image = np.zeros((21, 21))
-    image[10, 10] = 10.0
-    side = 6 + 1  # six samples along each axis
-    # |2 I - ..| is 20 + 20 at the point and 10 at its four neighbours; all are in the window.
-    assert sum_modified_laplacian(image, 1)[10, 10] == pytest.approx(80 / side**2)
-    faint = image / 100  # 0.4 is within the noise of sqrt(6) / 2
-    assert not sum_modified_laplacian(faint, 1).any()
-    slope = np.add.outer(np.arange(40.0), 2 * np.arange(40.0))
-    assert np.abs(sum_modified_laplacian(slope, 1)[8:-8, 8:-8]).max() < 1e-9  # running sums round
-
-
-def test_shape_from_focus_leaves_what_is_sharper_at_a_probe(two_squares):
-    between = 2 / (1 / two_squares.z_mm[0] + 1 / two_squares.z_mm[1])  # 6 px of blur from either
-    focus = segment(two_squares.counts, [*two_squares.z_mm, between], method="shape-from-focus")
-    assert focus.in_focus[2].sum() < 0.2 * two_squares.masks[0].sum()

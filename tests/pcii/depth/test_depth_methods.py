@@ -7,8 +7,6 @@ from twins import unit_grid
 
 import pcii
 from pcii.depth import depth_methods, estimate_depth
-from pcii.depth.depth_planes import modes_mm
-from pcii.depth.methods import GROUP
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 RANGE_MM = (1 / 5.9, 1 / 3.1)
@@ -51,12 +49,9 @@ def data_of(kind: str, grid: CameraGrid, views: np.ndarray) -> PhotonCounts | Vi
 
 
 @pytest.mark.parametrize(("method", "kind", "most_px"), METHODS)
-@pytest.mark.parametrize("pitch_mm", [(1.0, 1.0), (1.0, 0.6)])
-def test_a_wall_is_found_where_it_is(
-    method: str, kind: str, most_px: float, pitch_mm: tuple[float, float]
-) -> None:
-    grid = unit_grid(5, 7, 64, 72, pitch_mm)
-    seen = wall_views(grid, (TRUE_PX * pitch_mm[0], TRUE_PX * pitch_mm[1]))
+def test_a_wall_is_found_where_it_is(method: str, kind: str, most_px: float) -> None:
+    grid = unit_grid(5, 7, 64, 72, pitch_mm=(1.0, 0.6))
+    seen = wall_views(grid, (TRUE_PX, 0.6 * TRUE_PX))
     depth = estimate_depth(data_of(kind, grid, seen), RANGE_MM, method=method)
     inner = np.s_[16:-16, 16:-16]
     error_px = np.abs(6 / depth.z_mm[inner] - 6 * TRUE_PX)
@@ -109,14 +104,6 @@ def test_where_nothing_is_seen_there_is_no_depth(method: str) -> None:
     assert (depth.confidence == 0).all()
 
 
-def test_the_default_follows_the_data() -> None:
-    grid = unit_grid(3, 3, 24, 24)
-    views = wall_views(grid, (2.0, 2.0))
-    by_default = pcii.estimate_depth(Views(views, grid), (0.3, 0.9))
-    by_name = pcii.estimate_depth(Views(views, grid), (0.3, 0.9), method="posterior")
-    assert np.array_equal(by_default.z_mm, by_name.z_mm, equal_nan=True)
-
-
 @pytest.mark.parametrize(
     ("method", "sentence"),
     [
@@ -143,7 +130,9 @@ def half_a_map(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
 
 
 def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = [EntryPoint(name, f"{__name__}:{name}", GROUP) for name in ("halfway", "half_a_map")]
+    points = [
+        EntryPoint(name, f"{__name__}:{name}", "pcii.depth_methods") for name in ("halfway", "half_a_map")
+    ]
     monkeypatch.setattr(
         "importlib.metadata.entry_points", lambda group: [point for point in points if point.group == group]
     )
@@ -161,14 +150,10 @@ def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> Non
     ("z_mm", "confidence", "sentence"),
     [
         (-0.5, 1.0, "^method: 'wrong' must return depths above 0 mm, or NaN where it has no answer$"),
-        (np.inf, 1.0, "^method: 'wrong' must return depths above 0 mm"),
         (0.5, np.nan, "^method: 'wrong' must return a confidence from 0 to 1, also where"),
-        (0.5, 1.5, "^method: 'wrong' must return a confidence from 0 to 1"),
-        (0.5j, 1.0, "^z_mm: expected real numbers"),
-        (0.5, 1j, "^confidence: expected real numbers"),
     ],
 )
-def test_a_map_that_cannot_be_is_refused(z_mm: complex, confidence: complex, sentence: str) -> None:
+def test_a_map_that_cannot_be_is_refused(z_mm: float, confidence: float, sentence: str) -> None:
     grid = unit_grid(2, 2, 8, 8)
 
     def wrong(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
@@ -184,19 +169,3 @@ def test_too_many_photons_for_the_likelihood_sweep_are_refused() -> None:
     bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 2**20 + 1), grid)
     with pytest.raises(pcii.InputError, match=r"more than 2\^40 photons"):
         estimate_depth(bright, (0.5, 1.0), method="sweep-17")
-
-
-def test_planes_are_where_a_depth_map_has_most_surfaces() -> None:
-    """Two walls and a card, by hand: shares of the confidence, not of the pixels, decide."""
-    grid = unit_grid(4, 4, 20, 40)  # total disparities are 3 / z px
-    total_px = np.full((20, 40), np.nan)
-    confidence = np.ones((20, 40))
-    total_px[:, :20], total_px[:, 20:30] = 30.0, 33.5
-    total_px[:, 30:33], total_px[:, 33:36] = 50.0, 52.0  # of one bulging thing
-    total_px[:, 36:], confidence[:, 36:] = 70.0, 0.1  # as large, and unsure
-    depth = pcii.DepthMap(3 / total_px, confidence)
-    # What is within 4 px of the largest window belongs to it: its edge, not a surface of its own.
-    assert modes_mm(depth, grid) == pytest.approx([3 / 51, 3 / 31.1667], rel=1e-4)
-    apart = pcii.DepthMap(3 / np.where(total_px == 33.5, 35.5, total_px), confidence)
-    assert modes_mm(apart, grid) == pytest.approx([3 / 51, 3 / 35.5, 3 / 30], rel=1e-4)
-    assert modes_mm(pcii.DepthMap(np.full((20, 40), np.nan), 0 * confidence), grid) == ()

@@ -7,9 +7,7 @@ import pytest
 from twins import unit_grid
 
 from pcii.base import threads, use_threads
-from pcii.depth import NetworkInputs, PosteriorDepth, SurfacePrior, depth_map_of, run_network, surface_network
-from pcii.depth.network_inputs import hint_of, inputs_of
-from pcii.depth.surface_network import depth_prior, near_requested
+from pcii.depth import NetworkInputs, PosteriorDepth, depth_map_of, run_network
 from pcii.evidence import evidence_of_texture
 from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
@@ -43,47 +41,24 @@ def test_it_gives_a_distribution_for_each_block() -> None:
     assert in_focus.sum(axis=0).max() <= 1 + 1e-6
 
 
-def test_each_depth_is_near_the_closest_requested_plane_within_reach() -> None:
-    near = near_requested(40, np.array([30.0, 4.4, np.nan]))
-    assert near[:, 15:20].sum() == 0
-    assert near[1].nonzero()[0].tolist() == list(range(15))
-    assert near[0].nonzero()[0].tolist() == list(range(20, 40))
-    assert near_requested(7, np.zeros(0)).shape == (0, 7)
+def test_a_requested_plane_is_three_times_as_probable_within_two_planes(monkeypatch) -> None:
+    monkeypatch.setattr("pcii.depth.surface_network.TEMPERATURE", 1.0)
 
+    def probability_of(*planes: float) -> np.ndarray:
+        probability, _, in_focus = run_network(random_inputs(Z=30), np.array(planes))
+        assert len(in_focus) == len(planes)
+        return probability
 
-def test_a_requested_plane_is_three_times_as_probable_and_the_others_alike() -> None:
-    prior = depth_prior(60, np.array([20.0, 41.5]))
-    assert prior[[0, 20, 22, 59]] == pytest.approx([1, 3, 1 + 2 * np.exp(-0.5), 1], abs=1e-3)
-    assert prior[41] == prior[42]
-    np.testing.assert_array_equal(depth_prior(9, np.zeros(0)), np.ones(9))
-
-
-def test_depths_and_masks_are_weighted_by_the_request_and_masks_by_what_was_learned(monkeypatch) -> None:
-    monkeypatch.setattr(
-        surface_network, "TEMPERATURE", 1.0
-    )  # so that depths are those that masks are made of
-
-    def of(*planes: float) -> tuple[np.ndarray, np.ndarray]:
-        """Probabilities of planes, and the logits of masks solved from the equation of the theory."""
-        requested = np.array(planes)
-        probability, _, in_focus = run_network(random_inputs(Z=30), requested)
-        near = np.tensordot(near_requested(30, requested), probability, axes=1) + surface_network.MIN_NEAR
-        far = 1 - near.sum(axis=0) + (len(planes) + 1) * surface_network.MIN_NEAR
-        return probability, np.log(in_focus / near) - np.log((1 - in_focus.sum(axis=0)) / far)
-
-    (one, logits), (both, (lower, upper)) = of(3.4), of(3.0, 4.0)
-    for probability, planes in ((one, [3.4]), (both, [3.0, 4.0])):
-        expected = of()[0] * depth_prior(30, np.array(planes))[:, None, None]
-        expected *= probability.sum(axis=0) / expected.sum(axis=0)
-        np.testing.assert_allclose(probability, expected, rtol=1e-3, atol=1e-7)
-    # What was learned is of planes, whatever is requested.
-    np.testing.assert_allclose(logits[0], 0.6 * lower + 0.4 * upper, atol=0.02)
-    assert logits.std() > 0.05
+    for planes in ([3.4], [3.0, 14.0]):
+        prior = 1 + 2 * sum(np.exp(-(((np.arange(30) - plane) / 2) ** 2) / 2) for plane in planes)
+        found, expected = probability_of(*planes), probability_of() * prior[:, None, None]
+        expected *= found.sum(axis=0) / expected.sum(axis=0)
+        np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-7)
 
 
 def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = run_network(random_inputs(), PLANES)
-    monkeypatch.setattr(surface_network, "BAND_VALUES", 5 * 96 * 7)
+    monkeypatch.setattr("pcii.depth.surface_network.BAND_VALUES", 5 * 96 * 7)
     for own, expected in zip(run_network(random_inputs(), PLANES), whole, strict=True):
         # The runtime may order sums otherwise for another size.
         np.testing.assert_allclose(own, expected, rtol=1e-4, atol=1e-6)
@@ -112,26 +87,6 @@ def test_inputs_tell_how_much_light_there_is(two_squares) -> None:
     assert float(of(two_squares.counts).light[0] - of(few).light[0]) == pytest.approx(np.log10(4), abs=0.05)
 
 
-def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
-    grid = two_squares.counts.grid
-    planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
-    evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
-    samples, hint = grid.view_count * METHOD.block_px**2, hint_of(len(planes), np.array([2.0]))
-    film = slice(0, 2 * -(-evidence.nats.shape[1] // 2)), slice(0, 2 * -(-evidence.nats.shape[2] // 2))
-    own = inputs_of(evidence, samples, SurfacePrior(), film, hint)
-    turned = inputs_of(
-        evidence._replace(
-            nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
-        ),
-        samples,
-        SurfacePrior(),
-        film,
-        hint,
-    )
-    for part, other in zip(own[:4], turned[:4], strict=True):
-        np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
-
-
 def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
     """To the last bit, the mirrored end of the film included."""
     planes = FocalPlanes.at_total_disparity(two_squares.counts.grid, np.arange(2.0, 5.0))
@@ -141,13 +96,6 @@ def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
     part = METHOD.network_inputs(evidence, planes, 2, np.zeros(0), (slice(h - 96, h), slice(32, w)))
     for whole, own, side in zip(film[:4], part[:4], (1, 1, 2, 2), strict=True):
         assert np.array_equal(whole[:, (h - 96) // side :, 32 // side :], own)
-
-
-def test_a_hint_says_how_near_a_plane_is_to_the_nearest_requested_one() -> None:
-    hint = hint_of(6, np.array([1.0, 28.0]))
-    np.testing.assert_allclose(hint[:, 0], np.exp(-(((np.arange(6) - 1) / 1.5) ** 2) / 2), rtol=1e-6)
-    assert (np.diff(hint[1:, 1]) < 0).all()
-    assert not hint_of(6, np.zeros(0)).any()
 
 
 def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() -> None:

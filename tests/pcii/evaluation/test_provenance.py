@@ -1,24 +1,19 @@
 """What other software made is made again, in evaluations and in results alike, and it is said why."""
 
-import ast
 import hashlib
 import html
 import re
-import sys
-from importlib.metadata import packages_distributions, version
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 from other_packages import install_package
 from tiny_datasets import OWN, write_dataset
 
-import pcii
 from pcii.evaluation import NamedMethod, evaluate, read_rows, software_of
 from pcii.evaluation.rows import writing_rows
-from pcii.store import machine, own_software
+from pcii.store import machine
 
-COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
-DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}
 CODE = """
 from pcii import DepthMap, Segmented
 from pathlib import Path
@@ -44,20 +39,6 @@ def strange(folder: Path, monkeypatch: pytest.MonkeyPatch, change: str = "") -> 
     files, _ = CHANGES.get(change, ({}, ""))
     files = {"strange/__init__.py": CODE, "strange/weights.txt": "1"} | files
     install_package(folder, monkeypatch, POINTS, files)
-
-
-def test_every_package_that_computes_is_recorded() -> None:
-    imported = set[str]()
-    for room in COMPUTES:
-        for file in (Path(pcii.__file__).parent / room).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                if isinstance(node, ast.Import):
-                    imported |= {alias.name for alias in node.names}
-                elif isinstance(node, ast.ImportFrom) and node.module:
-                    imported.add(node.module)
-    roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
-    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
-    assert packages - DRAWS_OR_TALKS <= set(own_software())
 
 
 @pytest.mark.parametrize("change", CHANGES)

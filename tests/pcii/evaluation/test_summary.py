@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from pcii.base import InputError
-from pcii.evaluation import frame_of, mean_interval, means, means_over_scenes, ranks, sign_flip_p
-from pcii.evaluation.summary import MAX_EXACT_PAIRS, RANDOM_FLIPS, Kind, with_yardsticks
+from pcii.evaluation import frame_of, mean_interval, means, ranks, sign_flip_p
 
 
 def test_the_interval_is_students() -> None:
@@ -30,7 +29,7 @@ def test_intervals_by_hand() -> None:
 
 
 @pytest.mark.parametrize("kind", ["signed", "share", "positive"])
-def test_one_value_has_no_interval_and_equal_ones_one_without_width(kind: Kind) -> None:
+def test_one_value_has_no_interval_and_equal_ones_one_without_width(kind: Any) -> None:
     one = mean_interval([0.4], kind)
     assert (one.n, one.mean) == (1, 0.4)
     assert np.isnan([one.low, one.high]).all()
@@ -38,7 +37,7 @@ def test_one_value_has_no_interval_and_equal_ones_one_without_width(kind: Kind) 
         assert mean_interval([value] * 3, kind) == (3, value, value, value)
 
 
-@pytest.mark.parametrize("values", [[], [0.5, float("nan")], [float("inf")]])
+@pytest.mark.parametrize("values", [[], [0.5, float("nan")]])
 def test_what_has_no_mean_is_refused(values: list[float]) -> None:
     with pytest.raises(InputError, match="at least one finite number"):
         mean_interval(values)
@@ -80,17 +79,6 @@ def test_few_signs_are_flipped_by_hand(differences: list[float], p: float) -> No
     assert least_p == 2 / 2 ** len(differences)
 
 
-def test_many_signs_are_drawn_and_agree_with_all_of_them() -> None:
-    x = np.random.default_rng(5).normal(0.05, 0.14, MAX_EXACT_PAIRS + 1)
-    signs = 1 - 2.0 * ((np.arange(1 << x.size)[:, None] >> np.arange(x.size)) & 1)
-    exact = np.mean(np.abs(signs @ x) >= abs(x.sum()) * (1 - 1e-12))
-    found, _ = sign_flip_p(x)
-    # Twice the smaller tail: four standard deviations of that share.
-    assert abs(found - exact) < 8 * np.sqrt(exact / 2 * (1 - exact / 2) / RANDOM_FLIPS)
-    assert sign_flip_p(x)[0] == found
-    assert sign_flip_p(x + 1) == (pytest.approx(2 / (1 + RANDOM_FLIPS)), 2 / (1 + RANDOM_FLIPS))
-
-
 A, B = "depth:a", "depth:b"
 
 
@@ -125,37 +113,6 @@ def test_each_scene_counts_once_with_the_seeds_that_all_methods_have() -> None:
     assert second["p"] == second["least_p"] == 0.5
 
 
-def test_yardsticks_stand_beside_methods_and_measures_of_which_less_is_better_do_not_rank() -> None:
-    one_depth = {"within_1px": 0.5, "within_3px": 0.75, "quadratic_score": 0.25}
-    rows = [row(scene, 1, method, 0.4, one_depth=one_depth) for scene in "xy" for method in (A, B)]
-    planes = [
-        {
-            "z_mm": z,
-            "object": None,
-            "truth": truth,
-            "iou": iou,
-            "everything": {"iou": iou, "false_share": 0.5},
-        }
-        for z, iou in ((1.0, 0.25), (2.0, None))
-        for truth in ("object", "pixel")
-    ]
-    rows.append(
-        {name: value for name, value in rows[0].items() if name != "depth"}
-        | {"method": "c", "planes": planes}
-    )
-    frame = with_yardsticks(frame_of(rows))
-    assert not [name for name in map(str, frame.columns) if "everything" in name or "one_depth" in name]
-    of = means(frame, ["scene", "method"]).set_index(["scene", "method", "measure"])["mean"]
-    assert of["x", "(one depth)", "within_1px"] == 0.5
-    assert of["x", "(nothing)", "within_3px"] == of["x", "(nothing)", "pixel_iou"] == 0.0
-    assert (of["x", "(everything)", "iou"], of["x", "(everything)", "false_share"]) == (0.25, 0.5)
-    assert ("y", "(everything)", "iou") not in of
-    ranked = ranks(frame, "within_1px")
-    assert ranked["method"].tolist() == ["(one depth)", A, B, "(nothing)"]
-    with pytest.raises(InputError, match=r"^measure: methods are ranked by iou, .*, got 'bad_1px'"):
-        ranks(frame, "bad_1px")
-
-
 def test_one_method_over_many_scenes_has_one_mean_and_equal_methods_share_a_rank() -> None:
     (alone,) = ranks(frame_of([row(str(n), 1, A, n / 4) for n in range(4)]), "within_1px").to_dict("records")
     # Deviation 0.3227: 3.18245 * 0.3227 / 2 = 0.5136, and no share is below 0.
@@ -184,13 +141,3 @@ def test_means_are_over_the_seeds_that_have_a_value() -> None:
     expected |= {"reliability.0.9-1.0.share": (3, 0.5), "reliability.0.9-1.0.confidence": (2, 0.94)}
     for measure, (n, mean) in expected.items():
         assert (table.at[measure, "n"], table.at[measure, "mean"]) == (n, pytest.approx(mean))
-
-
-def test_scenes_count_once_in_means_over_scenes() -> None:
-    rows = [row("cards", 1, A, 0.25), row("cards", 2, A, 0.75), row("slats", 1, A, 0.25)]
-    table = means_over_scenes(means(frame_of(rows)), {"within_1px": "geometric"}).set_index("measure")
-    assert (table.at["within_1px", "n"], table.at["within_1px", "mean"]) == (
-        2,
-        pytest.approx(np.sqrt(0.5 * 0.25)),
-    )
-    assert table.at["seconds", "mean"] == 1.0

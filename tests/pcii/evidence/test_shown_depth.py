@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from property_settings import mostly_slow
-from twins import blocky_texture, even_light, patch_views, unit_grid
+from twins import blocky_texture, patch_views, unit_grid
 
 from pcii.evidence import ShownDepth, TextureModel, evidence_of_texture
 from pcii.types import FocalPlanes, PhotonCounts
@@ -54,14 +53,6 @@ def test_what_lies_outside_the_range_shows_no_depth_in_it() -> None:
         assert not shown(patch_of(disparity_px, photons=1.0)).any()
 
 
-def test_a_camera_alone_shows_no_depth() -> None:
-    # A texture in full light in one view and noise in the others.
-    grid, rng = unit_grid(3, 3, 96, 96), np.random.default_rng(1)
-    film = rng.poisson(0.5, grid.shape_KLHW)
-    film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
-    assert not shown(PhotonCounts.from_dense(film, grid)).any()
-
-
 def test_noise_that_all_cameras_share_is_a_surface_where_they_put_it() -> None:
     # The planted fault: with the opposite order of cameras the same noise is none.
     noise = np.random.default_rng(2).poisson(1.0, (200, 200, 1))
@@ -69,15 +60,3 @@ def test_noise_that_all_cameras_share_is_a_surface_where_they_put_it() -> None:
     film = patch_views(noise, -36, -36, 5, grid)[..., 0].astype(int)
     assert shown(PhotonCounts.from_dense(film, grid)).mean() > 0.9
     assert not shown(PhotonCounts.from_dense(film[::-1, ::-1], grid)).any()
-
-
-@pytest.mark.parametrize(
-    ("rate", "views"),
-    mostly_slow(
-        [(rate, views) for rate in (0.003, 0.1, 1.0, 1e4) for views in ((2, 1), (3, 4))],
-        quick=[(0.003, (3, 4)), (1.0, (2, 1))],
-    ),
-)
-def test_even_light_shows_no_depth(rate: float, views: tuple[int, int]) -> None:
-    grid = unit_grid(*views, 64, 80)
-    assert not any(shown(even_light(grid, rate, seed)).any() for seed in range(10))

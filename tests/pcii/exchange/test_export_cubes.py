@@ -57,14 +57,6 @@ def test_blocks_without_photons_take_no_room(tmp_path: Path) -> None:
     np.testing.assert_array_equal(indices, np.stack([frame, i, j], axis=1))
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5, -1.0], ids=["full", "dense", "empty"])
-def test_many_bits_of_a_block_and_none_at_all(tmp_path: Path, share: float) -> None:
-    grid = one_camera(64, 72)
-    bits = bits_of(grid, 200, share)  # 115 200 bytes: 28 blocks and a part of one
-    out = write_cubes(tmp_path, bits, grid)
-    np.testing.assert_array_equal(np.load(out / "00_00" / "frames.npy"), packed(bits[0, 0]))
-
-
 def test_counts_without_frames_are_refused_and_a_single_frame_is_one(tmp_path: Path) -> None:
     bits = bits_of(GRID)
     sums = pcii.PhotonCounts.from_dense(bits.sum(axis=2), GRID, frames=FRAMES, bits=1)

@@ -1,7 +1,6 @@
 """What is exported is read by programs that know nothing of this package, and nothing is half written."""
 
 import json
-import os
 import tarfile
 from dataclasses import asdict
 
@@ -126,15 +125,3 @@ def test_a_collection_is_exported_as_a_whole_or_not_at_all(collection, tmp_path)
     write_index(collection, [])
     message = one_sentence(lambda: pcii.export_dataset(collection, "hci", tmp_path / "out"), collection)
     assert "no finished dataset" in message
-
-
-def test_a_full_disk_leaves_nothing_behind(tmp_path, monkeypatch):
-    data = make_dataset(tmp_path / "data")
-
-    def disk_is_full(handle):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", disk_is_full)
-    with pytest.raises(OSError, match="out"):
-        pcii.export_dataset(data, "events", tmp_path / "out")
-    assert [path.name for path in tmp_path.iterdir()] == ["data"]

@@ -128,11 +128,3 @@ def test_what_the_layout_cannot_say_is_refused(tmp_path, shear_px):
     data = write_planes(tmp_path / "planes", grid_of(2, 2, height=8, width=8, shear_px=shear_px))
     assert "shear_px" in one_sentence(lambda: pcii.export_dataset(data, "hci", tmp_path / "hci"), data)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["planes"]
-
-
-def test_a_row_of_cameras_may_have_any_pitch_down_and_its_lens_has_an_f_number(tmp_path):
-    grid = grid_of(1, 3, pitch_mm=(9.0, 8.0), shear_px=(2.0, -7.0))
-    lens = {"aperture_mm": 5.0, "focus_mm": 600.0}
-    hci = exported(write_planes(tmp_path / "planes", grid, recipe={"grid": {"lens": lens}}))
-    assert (hci.rows, hci.cols, hci.baseline_mm, hci.offset_px, hci.fstop) == (1, 3, 9.0, 2.0, 5.0)
-    assert np.median(hci.pfm("gt_disp_lowres.pfm")[:10]) == pytest.approx(2.5)

@@ -106,13 +106,6 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
 
 
-def test_views_that_fit_in_no_order_have_a_next_step(photos: Path, tmp_path: Path, capsys) -> None:
-    shuffled = [divmod(n, 3) for n in (3, 7, 2, 0, 6, 8, 5, 1, 4)]
-    assert run(*pages(photos, tmp_path / "mine", shuffled)) == 0
-    said = capsys.readouterr().out
-    assert re.search(r"nothing is clearly sharp from [\d.]+ mm to infinity; .*name depths", said)
-
-
 @pytest.mark.parametrize(
     ("shear", "words"),
     [(0, "--shear-px, such as (2.[5-9]|3) (2.[5-9]|3);"), (2.7, "sharpest at 6")],
@@ -187,34 +180,15 @@ def array(values: Any, name: str = "in.npy") -> Make:
     return make
 
 
-def channels(root: Path) -> None:
-    frames = np.zeros((4, 2, H, W), np.uint8)
-    tifffile.imwrite(root / "0_0.tif", frames, imagej=True, metadata={"axes": "TCYX"})
-
-
-def tiff_of(number: int) -> Make:
-    def make(root: Path) -> Path:
-        tifffile.imwrite(root / "in.tif", np.zeros((number, H, W), np.uint8), photometric="minisblack")
-        return root / "in.tif"
-
-    return make
-
-
-TIF = {"ending": "tif"}
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
     ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "1 of 5 x 5 views missing, first row 1, col 1"),
-    ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
     ("alpha", folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")), NAMED, "0_0.png: has an alpha channel"),
     ("turned JPEG", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
-    ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),
-    ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
-    ("channels as pages", folder(channels, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
     ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
     ("options of other sources", folder(), [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames: not for .*, which is read as pictures"),
-    ("grid of known cameras", lambda root: hci_folder(root / "in"), ["--grid", 3, 3], "--grid: not for .*, which is read as a scene of the HCI"),
 ]  # fmt: skip
 
 

@@ -79,14 +79,6 @@ def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
     assert find_grid(read(tmp_path, frames)).pitch_mm == pytest.approx((5, 4), rel=1e-4)
 
 
-@pytest.mark.parametrize("numbers", [(0, 1, 2, 3, 4), (0, 4), (0, 1, 2, 3, 4, 1)])
-def test_every_place_has_one_camera(tmp_path: Path, numbers) -> None:
-    frames = [frames_of(2, 3)[n] | {"file_path": f"{count}.png"} for count, n in enumerate(numbers)]
-    file = read(tmp_path, frames)
-    words = f"frames: {len(numbers)} cameras do not stand one at each place of a plane grid"
-    assert words in one_sentence(lambda: find_grid(file), file.path)
-
-
 @pytest.mark.parametrize(
     ("film", "focal_mm", "pixel_mm"),
     [

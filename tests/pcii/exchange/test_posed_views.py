@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_runs import check_refused, run
+from command_runs import run
 from picture_folders import H, W, numbers, write
 from posed_frames import frames_of
 
@@ -71,8 +71,3 @@ def test_cubes_that_are_not_packed_come_in_by_their_poses(tmp_path: Path) -> Non
     dataset = imported(source)
     assert (dataset.grid.pitch_mm, dataset.counts.readout.frames) == ((2, 2), 5)
     np.testing.assert_array_equal(dataset.counts.dense[0], bits.sum(axis=1))
-
-
-def test_pictures_of_another_size_are_refused(tmp_path: Path, capsys) -> None:
-    words = f"is {H} x {W} px, where transforms.json says {H} x {W + 1}"
-    check_refused(posed(tmp_path / "a", w=W + 1), tmp_path / "mine", [], words, capsys)

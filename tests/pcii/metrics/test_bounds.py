@@ -5,7 +5,6 @@ import pytest
 from twins import unit_grid
 
 from pcii.metrics import depth_bound_px, object_bounds
-from pcii.metrics.bounds import log_gradient_squared
 from pcii.sections import reconstruct
 from pcii.types import CameraGrid, PhotonTruth, Truth, Views
 
@@ -40,27 +39,10 @@ def test_without_information_on_depth_there_is_no_bound() -> None:
     assert depth_bound_px(grid, 0, (0.1, 0.1)) is None
     assert depth_bound_px(grid, 100, (0.0, 0.0)) is None
     assert depth_bound_px(unit_grid(1, 1, 4, 4), 100, (0.1, 0.1)) is None
-    dark = np.zeros((4, 4, 3))
-    assert log_gradient_squared(dark, dark + 1, np.ones((4, 4), dtype=bool)) is None
-
-
-def test_gradients_are_those_of_an_exponential_slope_whatever_the_coverage() -> None:
-    i, j = np.mgrid[:60, :60]
-    inside = np.zeros((60, 60), dtype=bool)
-    inside[10:50, 10:50] = True
-    rate = np.stack([np.exp(0.1 * j), np.exp(0.2 * i), np.ones((60, 60))], axis=-1)
-    coverage = np.ones((60, 60, 3)) * [2, 1, 4]
-    found = log_gradient_squared(rate * coverage, coverage, inside)
-    # Colours by hand: photons share out as coverage x rate, and a central difference is sinh.
-    light = (coverage * rate)[inside].sum(axis=0)
-    smooth = np.exp(np.array([0.1, 0.2, 0.0]) ** 2 / 8)  # a Gaussian of 1/2 px scales an exponential
-    light = light * smooth
-    expected = light[:2] * np.sinh([0.1, 0.2]) ** 2 / light.sum()
-    assert found == pytest.approx(tuple(expected), rel=1e-3)  # the filter ends at 4 sigma
 
 
 def test_objects_have_bounds_where_light_texture_and_photons_are_known() -> None:
-    grid = unit_grid(5, 5, 60, 80)
+    grid = unit_grid(3, 5, 60, 80)  # texture along rows and down columns tells depth differently well
     ids = np.zeros((60, 80), dtype=int)
     ids[:, :40], ids[:, 45:] = 1, 2
     z = np.where(ids == 1, 0.5, np.where(ids == 2, 1.0, np.inf))

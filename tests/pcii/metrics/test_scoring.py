@@ -99,14 +99,6 @@ def test_a_floor_belongs_to_no_plane_and_a_table_counts_in_no_score() -> None:
     assert depth["coverage"] == (36 + 64) / (36 + 64 + 4 * 32)
 
 
-def test_who_looks_at_no_photon_scores_as_stated_beside_every_method() -> None:
-    rows = score(segmented(np.ones((2, 24, 32), dtype=bool)), None, truth()).planes
-    for row in rows:
-        assert row["everything"] == {"iou": row["iou"], "false_share": row["false_share"]}
-    nothing = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, truth()).planes
-    assert {(row["iou"], row["false_share"]) for row in nothing} == {(0.0, 0.0)}
-
-
 def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
     z = np.where(np.isfinite(true.z_mm), true.z_mm, np.nan)
     return z, np.isfinite(z).astype(float)

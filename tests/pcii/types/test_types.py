@@ -5,7 +5,6 @@ import pytest
 from twins import unit_grid
 
 from pcii.base import InputError
-from pcii.removal import segment
 from pcii.sections import reconstruct
 from pcii.types import CameraGrid, DepthMap, FocalPlanes, PhotonCounts, Sections, Segmented, Truth, Views
 
@@ -24,10 +23,10 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        *(("rows", value, "at least 1") for value in (0, 2.0, True)),
-        *(("focal_mm", value, "above 0 mm") for value in (0, NAN, "5")),
-        *(("pitch_mm", value, "above 0 mm") for value in (5.0, (5.0,), (5.0, 0.0))),
-        *(("shear_px", value, "numbers") for value in (1.0, (1.0, NAN))),
+        *(("rows", value, "at least 1") for value in (0, 2.0)),
+        *(("focal_mm", value, "above 0 mm") for value in (0, NAN)),
+        ("pitch_mm", 5.0, "above 0 mm"),
+        ("shear_px", (1.0, NAN), "numbers"),
     ],
 )
 def test_a_camera_grid_that_cannot_be_is_refused_by_name(name, value, words):
@@ -49,27 +48,15 @@ def sections() -> Sections:
     [
         (lambda: Views(np.zeros((1, 1, 2, 3, 3)), FILM), "radiance: expected shape"),
         (lambda: Views(np.zeros((1, 1, 2, 2, 3)), FILM, cfa="GRBG"), "radiance: a Bayer mosaic has one"),
-        (lambda: Views(np.zeros((1, 1, 2, 2, 1), dtype=complex), FILM), "radiance: expected real numbers"),
         (lambda: Views(np.ones((1, 1, 2, 2, 1), ">u2"), FILM), "radiance: .*sRGB"),
         (lambda: Sections(FocalPlanes.at_depths(FILM, [1.0, 2.0]), STACK, STACK), "counts: "),
-        (lambda: Sections(FocalPlanes.at_depths(FILM, 1.0), STACK, STACK[..., 0]), "coverage: "),
         (lambda: Segmented(MASKS * 1.0, "none", sections()), "in_focus: expected bool"),
-        (
-            lambda: Segmented(MASKS, "none", sections(), photon_in_focus=np.zeros((2, 5), dtype=bool)),
-            r"photon_in_focus: expected bool \(1, events\)",
-        ),
         (lambda: DepthMap(ONES, ONES[:1]), "z_mm, confidence: "),
         (lambda: Truth(ONES * NAN, IDS, {}), "z_mm: true depths are above 0 mm and never NaN"),
         (lambda: Truth(ONES, IDS + 2, {1: "ball"}), "object_id: id 2 has no name"),
-        (lambda: Truth(ONES, IDS, {1: "ball"}, unscored=frozenset({1, 2})), "unscored: there is no object"),
         (lambda: Truth(ONES, IDS, {}, coverage=ONES), r"coverage: expected float32 \(2, 2\)"),
-        (
-            lambda: Truth(ONES, IDS, {}, coverage=np.full((2, 2), 1.1, np.float32)),
-            "coverage: expected values",
-        ),
         (lambda: PhotonCounts.from_dense(IDS, {"rows": 1}), "grid: expected a CameraGrid, got dict"),  # type: ignore[arg-type]
         (lambda: reconstruct(IDS, [1.0]), r"data: expected PhotonCounts or Views .*, got ndarray"),  # type: ignore[arg-type]
-        (lambda: segment(IDS, [1.0]), r"counts: expected PhotonCounts .*, got ndarray"),  # type: ignore[arg-type]
     ],
 )
 def test_what_does_not_fit_is_refused_by_name(make, words):
@@ -89,7 +76,7 @@ def test_no_array_of_a_result_can_be_written_to():
     assert not any(np.asarray(a).flags.writeable for a in (*arrays, *more))
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_view_with_nan_or_infinity_is_refused_by_its_place(bad):
     radiance = np.zeros((2, 2, 3, 3, 1))
     radiance[1, 0, 2, 2] = bad
