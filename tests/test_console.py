@@ -36,7 +36,7 @@ def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
     # A process that heeds Ctrl-C, whoever started this one.
     script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
     script += "from simgen.app.commands import main; sys.exit(main())"
-    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2"]
+    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2", "--set", "grid.cols=3"]
     command = ["generate", "small", "-o", str(out), *settings]
     process = subprocess.Popen([sys.executable, "-c", script, *command], stderr=subprocess.PIPE, text=True)
     wait_for(out / "radiance" / "view_00_01.exr")

@@ -22,7 +22,7 @@ dtypes = st.sampled_from([np.int32, np.int64, np.uint8, np.uint16, np.float32, n
 
 
 @given(array=dtypes.flatmap(lambda dtype: hnp.arrays(dtype, shapes)))
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_arrays_of_any_shape_come_back_to_the_bit(tmp_path, array):
     folder = tmp_path / "a.zarr"  # written over, again and again
     x = Label(tuple(f"axis_{n}" for n in range(array.ndim)), "anything")
