@@ -68,13 +68,6 @@ def test_finer_voxels_come_back_as_pixels_and_as_voxels(two_squares):
         np.testing.assert_array_equal(focus.in_focus[plane], halves)
 
 
-def test_results_are_named_by_what_is_left_out():
-    assert ThreeStep().name == "three-step"
-    assert ThreeStep(2, threshold=False, entropy=False).name == (
-        "three-step-subpixel-2-without-threshold-without-entropy"
-    )
-
-
 @pytest.mark.parametrize("bad", [0, 1.5])
 def test_a_division_that_cannot_be_is_refused(bad):
     with pytest.raises(InputError, match=r"^subpixel: expected a whole number of at least 1"):
