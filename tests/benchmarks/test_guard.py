@@ -25,13 +25,6 @@ def test_a_ratio_that_is_gone_or_nan_is_a_loss() -> None:
     assert len(losses([with_ratios(fast=float("nan"))], reference)) == 1
 
 
-def test_other_sizes_and_studies_that_did_not_run_are_not_compared() -> None:
-    reference = reference_of([with_ratios(fast=10.0)])
-    full = record(size="full", measured=with_ratios(fast=1.0).measured)
-    assert losses([full], reference) == []
-    assert losses([], reference) == []
-
-
 def test_the_command_exits_with_1_on_a_planted_loss(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -88,8 +88,11 @@ def test_a_sheared_grid_is_judged_like_any_other() -> None:
     assert check_grid(Views(views[:, ::-1], grid), (30, 250)).order == ViewOrder(flip_cols=True)
 
 
-@pytest.mark.parametrize("stated", [0.0, -SHEAR, SHEAR / 8])
-@pytest.mark.parametrize("order", [ViewOrder(), ViewOrder(swap_axes=True)], ids=["right", "swapped"])
+@pytest.mark.parametrize(
+    ("stated", "order"),
+    [(0.0, ViewOrder()), (-SHEAR, ViewOrder()), (SHEAR / 8, ViewOrder(swap_axes=True))],
+    ids=["none", "opposite", "some, and swapped"],
+)
 def test_a_shift_that_was_taken_out_is_no_flip(stated, order) -> None:
     """Both signs of disparity in one grid tell a shift from a flip; the farthest is 2.6 px behind SHEAR."""
     shifted = render(replace(GRID, shear_px=(SHEAR, SHEAR)), CARDS, cell=8)

@@ -118,20 +118,8 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     said = capsys.readouterr().out
     assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in said
     assert "24 of 480 pixels have no known depth there, and count in no score" in said
-    dataset = pcii.open_dataset(tmp_path / "out")
-    truth = dataset.truth
+    truth = pcii.open_dataset(tmp_path / "out").truth
     assert truth is not None
-    assert dataset.views is not None
-    planes = pcii.FocalPlanes.at_depths(grid, [45, 90])
-    masks = pcii.TrueFocus(planes, truth).by_pixel
-    focus = pcii.Segmented(
-        masks, "by hand", pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
-    )
-    by_object, by_pixel = (
-        [row["iou"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
-        for kind in ("object", "pixel")
-    )
-    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))
     errors = depth_errors(grid, answer, truth)
