@@ -1,4 +1,4 @@
-"""A dataset of 2 x 3 views of 4 x 5 pixels as `simgen` lays it out, and ways to damage it."""
+"""A dataset of 2 x 3 views of 4 x 5 pixels, and ways to damage it."""
 
 import json
 from collections.abc import Callable
@@ -10,20 +10,8 @@ import pytest
 from twins import unit_grid
 
 from pcii.base import InputError
-from pcii.store import (
-    COUNTS,
-    MANIFEST,
-    PHOTON_TRUTH,
-    RADIANCE,
-    TRUTH,
-    list_files,
-    radiance_name,
-    write_arrays_safely,
-    write_exr_safely,
-    write_manifest,
-)
-from pcii.store.dataset_layout import FRAME
-from pcii.types import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
+from pcii.store import MANIFEST, save_dataset, write_manifest
+from pcii.types import PhotonCounts, PhotonTruth, Truth, Views
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)
@@ -36,31 +24,20 @@ def make_dataset(root: Path, *, sparse: bool = True, frames: int | None = None, 
 
     Of so many binary `frames`, which it keeps, the photons of a pixel are in the first ones.
     """
-    root.mkdir()
     k, l, i, j = np.nonzero(DENSE)
-    events = {"k": k, "l": l, "i": i, "j": j, "n": DENSE[k, l, i, j]}
-    if frames is not None:
-        events[FRAME] = np.concatenate([np.arange(n) for n in events["n"]])
-        overrides |= {"frames": frames, "bits": 1}
-    write_arrays_safely(root / COUNTS, events if sparse else {"dense": DENSE}, COUNTS_LABELS)
-    write_arrays_safely(root / TRUTH, {"z_mm": Z_MM, "object_id": IDS}, TRUTH_LABELS)
-    photons = int(DENSE.sum())
-    origins = {"object_id": np.ones(photons, np.int16), "z_mm": np.full(photons, 540.0, np.float32)}
-    write_arrays_safely(root / PHOTON_TRUTH, origins, PHOTON_TRUTH_LABELS)
-    for a, b in np.ndindex(GRID.rows, GRID.cols):
-        write_exr_safely(root / radiance_name(a, b), np.full((4, 5, 3), 3 * a + b, dtype=np.float32))
-    names = ("rows", "cols", "pitch_mm", "focal_mm", "pixel_mm", "height", "width")
-    manifest = {
-        "title": "by hand",
-        "grid": {name: getattr(GRID, name) for name in names},
-        "cfa": "GRBG",
-        "objects": {"1": "ball"},
-        "analysis": {"z_mm": [540.0], "z_range_mm": [450.0, 750.0]},
-        "recipe": {"photons": {"scope": "view", "budget": 10.0, "nested": []}},
-        "radiance_channels": 3,
-        "files": list_files(root, [COUNTS, TRUTH, PHOTON_TRUTH, RADIANCE]),
-    }
-    write_manifest(root, {**manifest, **overrides})
+    n = DENSE[k, l, i, j]
+    frame = None if frames is None else np.concatenate([np.arange(photons) for photons in n])
+    readout = {} if frames is None else {"frames": frames, "bits": 1, "frame": frame}
+    counts = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG")
+    if sparse:
+        counts = PhotonCounts.from_events(k, l, i, j, n, GRID, cfa="GRBG", **readout)
+    places = {name: column.repeat(n) for name, column in zip("klij", (k, l, i, j), strict=True)}
+    origins = PhotonTruth(**places, object_id=np.ones(n.sum(), int), z_mm=np.full(n.sum(), 540.0, np.float32))
+    light = np.broadcast_to(np.arange(6.0).reshape(2, 3, 1, 1, 1), (*GRID.shape_KLHW, 3))
+    images, truth = (counts, Views(light, GRID)), Truth(Z_MM, IDS, {1: "ball"}, photons=origins)
+    depths: dict[str, Any] = {"z_mm": [540.0], "z_range_mm": (450.0, 750.0), "photon_budget": 10.0}
+    save_dataset(root, images, truth, title="by hand", **depths)
+    rewrite_manifest(root, **overrides)
     return root
 
 
