@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from stored_datasets import rewrite_manifest
 from twins import unit_grid
 
-from pcii.store import COUNTS, TRUTH, list_files, nested_name, write_arrays_safely, write_manifest
-from pcii.types import COUNTS_LABELS, TRUTH_LABELS, PhotonCounts, Sections, Segmented
+from pcii.store import COUNTS, TRUTH, list_files, nested_name, save_dataset, write_counts
+from pcii.types import PhotonCounts, Sections, Segmented, Truth
 
 GRID = unit_grid(2, 2, 8, 12, pitch_mm=(10.0, 10.0))
 Z_MM = (1.0, 2.0)  # 10 and 5 px of disparity: 2.5 px of blur at the other's depth
@@ -21,43 +22,29 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
     The largest budget is its own, the others are nested. All pixels of the far object have two. In the last
     view all pixels have one.
     """
-    root.mkdir(parents=True)
-    own = max(hits)
-    for budget, near in hits.items():
-        dense = np.zeros(GRID.shape_KLHW, dtype=np.int64)
-        dense[1, 1] = 1
-        dense[0, 0][FAR] = 2
-        first = np.zeros(10, dtype=np.int64)
-        first[:near] = 1
-        dense[0, 0][NEAR] = first.reshape(2, 5)
-        k, l, i, j = np.nonzero(dense)
-        part = nested_name(COUNTS, None if budget == own else budget)
-        events = {"k": k, "l": l, "i": i, "j": j, "n": dense[k, l, i, j]}
-        write_arrays_safely(root / part, events, COUNTS_LABELS)
+    own, *nested = sorted(hits, reverse=True)
     z_mm, ids = np.full((8, 12), np.inf), np.zeros((8, 12), dtype=np.int16)
     z_mm[NEAR], ids[NEAR] = 1.0, 1
     z_mm[FAR], ids[FAR] = 2.0, 2
-    write_arrays_safely(root / TRUTH, {"z_mm": z_mm, "object_id": ids}, TRUTH_LABELS)
-    keys = ("rows", "cols", "pitch_mm", "focal_mm", "pixel_mm", "height", "width")
-    nested = [budget for budget in hits if budget != own]
-    parts = [TRUTH, *(nested_name(COUNTS, None if budget == own else budget) for budget in hits)]
-    manifest = {
-        "identity": f"{title}, seed {seed}",
-        "title": title,
-        "grid": {name: getattr(GRID, name) for name in keys},
-        "cfa": None,
-        "objects": {"1": "near", "2": "far"},
-        "analysis": {"z_mm": list(Z_MM), "z_range_mm": [0.8, 2.5]},
-        "recipe": {
-            "scene": title,
-            "seed": seed,
-            "photons": {"scope": "view", "budget": own, "nested": nested},
-        },
-        "scene": {},
-        "files": list_files(root, parts),
-    }
-    write_manifest(root, manifest)
+    truth = Truth(z_mm, ids, {1: "near", 2: "far"})
+    save_dataset(root, counts_of(hits[own]), truth, title=title, z_mm=Z_MM, z_range_mm=(0.8, 2.5))
+    for budget in nested:
+        write_counts(root / nested_name(COUNTS, budget), counts_of(hits[budget]))
+    photons = {"scope": "view", "budget": own, "nested": nested}
+    files = list_files(root, [TRUTH, COUNTS, *(nested_name(COUNTS, budget) for budget in nested)])
+    recipe = {"scene": title, "seed": seed, "photons": photons}
+    rewrite_manifest(root, identity=f"{title}, seed {seed}", recipe=recipe, scene={}, files=files)
     return root
+
+
+def counts_of(near: int) -> PhotonCounts:
+    """Photons of the two views, of which so many are of the near object."""
+    dense = np.zeros(GRID.shape_KLHW, dtype=np.int64)
+    dense[1, 1] = 1
+    dense[0, 0][FAR] = 2
+    dense[0, 0][NEAR] = (np.arange(10) < near).reshape(2, 5)
+    k, l, i, j = np.nonzero(dense)
+    return PhotonCounts.from_events(k, l, i, j, dense[k, l, i, j], GRID)
 
 
 def by_count(counts: PhotonCounts, sections: Sections) -> Segmented:
