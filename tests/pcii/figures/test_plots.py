@@ -4,6 +4,7 @@ import io
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -129,7 +130,7 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
 
 
 def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_and_svg() -> None:
-    grid = unit_grid(3, 3, 12, 100)  # at 1 mm a pixel is 1 mm wide
+    grid = replace(unit_grid(3, 3, 12, 100), pixel_mm=0.5)  # at 1 mm a pixel is 0.5 mm wide
     counts = pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid)
     sections = pcii.reconstruct(counts, [1.0, 10.0])
     focus = pcii.Segmented(np.zeros((2, 12, 100), bool), "by hand", sections)
@@ -142,7 +143,7 @@ def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_an
         labels.append(bar.txt_label.get_text())
         assert axes.figure.get_facecolor() == (1, 1, 1, 1)
         assert axes.get_xlabel() == ""
-    assert labels == ["20 mm", "200 mm"] * 2 + ["20 px"]
+    assert labels == ["10 mm", "100 mm"] * 2 + ["20 px"]
     for suffix, start in (("pdf", b"%PDF"), ("svg", b"<?xml")):
         panels[0].figure.savefig(file := io.BytesIO(), format=suffix)
         assert file.getvalue().startswith(start)
