@@ -13,6 +13,7 @@ from pcii.depth import (
     run_network,
 )
 from pcii.removal import segment
+from pcii.store import sample
 from pcii.types import CameraGrid, DepthMap, PhotonCounts
 
 RANGE_MM = (1 / 9, 1 / 1)
@@ -135,9 +136,9 @@ def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
     assert depth.confidence[is_plain].mean() < 0.1
 
 
-def test_a_range_without_the_object_still_answers_inside_the_range(two_squares):
-    near, far = 1 / 9, 1 / 5  # the first square is at 1 / 3
-    z = estimate_depth(two_squares.counts, (near, far)).z_mm
+def test_a_range_without_the_object_still_answers_inside_the_range():
+    near, far = 450, 580  # the bird is at 620 mm
+    z = estimate_depth(sample().counts, (near, far)).z_mm
     assert near <= np.nanmin(z) <= np.nanmax(z) <= far
 
 
@@ -215,16 +216,16 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
     assert errors_px(edges).mean() > 3 * errors_px(part).mean()  # the fault: no margin
 
 
-def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes(two_squares) -> None:
-    counts, z_mm, network = two_squares.counts, np.array([0.2, 0.5]), SheetModel(sweeps=0)
+def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes() -> None:
+    counts, z_mm, range_mm, network = sample().counts, np.array([540, 620]), (450, 750), SheetModel(sweeps=0)
     long_px = max(counts.grid.shape_HW)
     fine, coarse = (
         PosteriorDepth(sheets=network, block_px=side, trained_blocks=long_px // side).posterior(
-            counts, RANGE_MM, z_mm
+            counts, range_mm, z_mm
         )
         for side in (2, 4)
     )
-    both = PosteriorDepth(sheets=network, trained_blocks=long_px // 4).posterior(counts, RANGE_MM, z_mm)
+    both = PosteriorDepth(sheets=network, trained_blocks=long_px // 4).posterior(counts, range_mm, z_mm)
     for name in ("probability", "no_surface", "in_focus"):
         one, other = (getattr(each, name) for each in (fine, coarse))
         down, right = (

@@ -52,12 +52,12 @@ def test_nothing_is_in_focus_where_nothing_is(two_squares, method):
 
 
 @methods
-def test_sparse_and_dense_counts_give_the_same_masks(two_squares, found, method):
-    k, l, i, j = np.nonzero(two_squares.dense)
-    n = two_squares.dense[k, l, i, j]
-    sparse = PhotonCounts.from_events(k, l, i, j, n, two_squares.grid, cfa="GRBG")
-    one = segment(sparse, two_squares.z_mm, method=method).in_focus
-    np.testing.assert_array_equal(one, found(method).in_focus)
+def test_sparse_and_dense_counts_give_the_same_masks(method):
+    counts = sample().counts
+    dense = PhotonCounts.from_dense(counts.dense, counts.grid, cfa=counts.cfa)
+    assert counts.is_sparse != dense.is_sparse
+    one, other = (segment(each, [540, 620], method=method).in_focus for each in (counts, dense))
+    np.testing.assert_array_equal(one, other)
 
 
 @methods
@@ -93,10 +93,9 @@ def test_round_things_are_whole_though_less_than_5_px_of_spread_part_the_planes(
         assert intersection_over_union(mask, here) > 1 - 2 / 19
 
 
-def test_a_depth_that_is_asked_for_twice_is_answered_twice(two_squares, found):
-    first, second = two_squares.z_mm
-    twice = segment(two_squares.counts, [first, second, first], method="posterior")
-    once = found("posterior")
+def test_a_depth_that_is_asked_for_twice_is_answered_twice():
+    counts = sample().counts
+    once, twice = (segment(counts, z_mm, method="posterior") for z_mm in ([540, 620], [540, 620, 540]))
     np.testing.assert_array_equal(twice.in_focus[:2], once.in_focus)
     np.testing.assert_array_equal(twice.in_focus[2], once.in_focus[0])
 

@@ -3,6 +3,7 @@ import numpy as np
 from pcii.depth import depth_map_of, depth_posterior
 from pcii.removal import masks_of, segment
 from pcii.sections import reconstruct
+from pcii.store import sample
 from pcii.types import DepthPosterior, FocalPlanes
 
 
@@ -22,11 +23,10 @@ def test_a_block_belongs_to_the_most_probable_plane_or_to_none(two_squares):
     assert masks.sum() == 8
 
 
-def test_nothing_is_claimed_where_the_depth_map_has_no_answer(two_squares):
-    planes = FocalPlanes.at_depths(two_squares.grid, two_squares.z_mm)
-    range_mm = 0.8 * planes.z_mm.min(), 1.25 * planes.z_mm.max()
-    posterior = depth_posterior(two_squares.counts, range_mm, z_mm=planes)
-    focus = segment(two_squares.counts, two_squares.z_mm, z_range_mm=range_mm, method="posterior")
+def test_nothing_is_claimed_where_the_depth_map_has_no_answer():
+    counts, z_mm, range_mm = sample().counts, [540, 620], (450, 750)
+    posterior = depth_posterior(counts, range_mm, z_mm=FocalPlanes.at_depths(counts.grid, z_mm))
+    focus = segment(counts, z_mm, z_range_mm=range_mm, method="posterior")
     claimed = focus.in_focus.any(axis=0)
     assert claimed.any()
     assert np.isfinite(depth_map_of(posterior, range_mm).z_mm[claimed]).all()
