@@ -50,7 +50,8 @@ def test_a_requested_plane_is_three_times_as_probable_within_two_planes(monkeypa
         return probability
 
     for planes in ([3.4], [3.0, 14.0]):
-        prior = 1 + 2 * sum(np.exp(-(((np.arange(30) - plane) / 2) ** 2) / 2) for plane in planes)
+        offset = np.arange(30) - np.array(planes)[:, None]
+        prior = 1 + 2 * np.exp(-((offset / 2) ** 2) / 2).sum(axis=0)
         found, expected = probability_of(*planes), probability_of() * prior[:, None, None]
         expected *= found.sum(axis=0) / expected.sum(axis=0)
         np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-7)
