@@ -20,7 +20,7 @@ from simgen.app import commands as simgen_cli
 
 
 def wait_for(path: Path) -> None:
-    for _ in range(600):
+    for _ in range(2400):
         if path.exists():
             return
         time.sleep(0.05)
