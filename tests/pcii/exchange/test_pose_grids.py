@@ -31,19 +31,6 @@ def test_frames_in_any_order_of_a_rig_anywhere_are_put_in_their_places(tmp_path:
     assert found.shear_px == found.offset_px == (0.0, 0.0)
 
 
-def test_right_is_larger_x_and_down_is_smaller_y(tmp_path: Path) -> None:
-    pose = np.eye(4)
-    frames = []
-    for name, x, y in (("here", 0, 0), ("right", 0.01, 0), ("below", 0, -0.02), ("both", 0.01, -0.02)):
-        pose[:3, 3] = x, y, 0
-        frames.append({"file_path": f"{name}.png", "transform_matrix": pose.tolist()})
-    file = read(tmp_path, frames)
-    found = find_grid(file)
-    names = [[file.frame_name(n) for n in row] for row in found.numbers]
-    assert names == [["here.png", "right.png"], ["below.png", "both.png"]]
-    assert found.pitch_mm == (10, 20)
-
-
 def test_shear_and_a_common_principal_point_are_found(tmp_path: Path) -> None:
     frames = frames_of(3, 4)
     for frame, (k, l) in zip(frames, np.ndindex(3, 4), strict=True):
