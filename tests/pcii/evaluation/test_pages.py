@@ -23,7 +23,21 @@ from pcii.types import Segmented
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
 SHOWN = NAMES[:6]  # of so many scenes all tables are shown
 ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}
-ELEMENTS |= {"div", "table", "thead", "tbody", "tr", "th", "td", "strong", "figure", "img", "figcaption"}
+ELEMENTS |= {
+    "div",
+    "table",
+    "thead",
+    "tbody",
+    "tr",
+    "th",
+    "td",
+    "strong",
+    "figure",
+    "img",
+    "figcaption",
+    "details",
+    "summary",
+}
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 SCRIPT = (Path(pcii.figures.__file__).parent / "templates" / "report.js").read_bytes()
 SCRIPT_HASH = base64.b64encode(hashlib.sha256(SCRIPT).digest()).decode()

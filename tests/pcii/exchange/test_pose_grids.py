@@ -11,7 +11,6 @@ from stored_datasets import one_sentence
 
 from pcii import InputError
 from pcii.exchange import camera_grid_of, find_grid
-from pcii.exchange.transforms_file import MOST_PX
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()
 
@@ -61,7 +60,7 @@ def test_a_camera_out_of_its_place_is_named(tmp_path: Path, change, words) -> No
 def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
     """The nearest point moves by 640 / 4 px from camera to camera: 0.1 px are 1 / 1600 of 4 mm of pitch."""
     frames = frames_of(3, 4)
-    moved(frames[5], 0.9 * MOST_PX / 160 * 4, 0, 0)
+    moved(frames[5], 0.9 * 0.1 / 160 * 4, 0, 0)
     turned(frames[5], about_y(0.004))  # a point in a corner moves by less than 0.1 px
     assert find_grid(read(tmp_path, frames)).pitch_mm == pytest.approx((5, 4), rel=1e-4)
 
