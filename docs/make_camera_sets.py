@@ -15,10 +15,10 @@ import numpy as np
 
 import pcii
 import simgen
+from pcii.base.blocks import on_pixels
 from pcii.depth.methods import depth_posterior
 from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
 from pcii.evaluation.tables import NOT_BETTER, Table, markdown
-from pcii.imaging.blocks import on_pixels
 from pcii.removal.posterior_masks import masks_of
 from pcii.types.geometry import total_disparity_px
 

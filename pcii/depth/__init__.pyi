@@ -1,6 +1,5 @@
 from . import methods as methods
 from .depth_planes import check_range_mm as check_range_mm, check_search as check_search
-from .depth_planes import peak_depth_mm as peak_depth_mm
 from .methods import BUILT_IN as BUILT_IN, DEFAULT_METHOD as DEFAULT_METHOD, FOR_COUNTS as FOR_COUNTS
 from .methods import FOR_VIEWS as FOR_VIEWS, depth_methods as depth_methods
 from .methods import depth_posterior as depth_posterior, estimate_depth as estimate_depth

@@ -1,4 +1,4 @@
-"""Planes that a search of depth compares, and the depth between planes where a measure is largest."""
+"""Planes that a search of depth compares, and the depths at which a depth map has most surfaces."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,6 @@ from pcii.base.errors import InputError
 from pcii.types.arrays import check_z_mm
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap
-from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
 
 MOST_SPAN_PX = 2000.0
@@ -70,21 +69,3 @@ def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
         modes.append(float(weight[window] @ total_px[window] / share))
         weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
     return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())
-
-
-def peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:
-    """Depth (h, w) in mm of the top of a parabola through the `best` plane (h, w) and its neighbours.
-
-    `nearby` (3, h, w) is a measure at the plane before, at it and after it: larger the better the plane, and
-    not finite beyond the ends. Total disparities of the planes are evenly spaced. The depth stays within half
-    a step of the best plane.
-    """
-    total_px = planes.total_disparity_px
-    before, at, after = nearby
-    inner = np.isfinite(nearby).all(axis=0)
-    with np.errstate(invalid="ignore"):
-        curvature = np.where(inner, before - 2 * at + after, 0.0)
-        slope = np.where(inner, before - after, 0.0)
-    offset = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
-    step_px = total_px[1] - total_px[0]
-    return depth_of_total_disparity_mm(planes.grid, total_px[best] + np.clip(offset, -0.5, 0.5) * step_px)

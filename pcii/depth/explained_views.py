@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.base.compiled_loops import each_in_threads
 from pcii.depth.sheet_kernels import (
     add_up,
@@ -29,7 +30,6 @@ from pcii.depth.sheet_kernels import (
 from pcii.depth.sheet_textures import smooth_texture, textures
 from pcii.depth.sheets import SheetModel, Sheets
 from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
-from pcii.imaging.blocks import block_sums
 from pcii.types.geometry import parallax_per_total
 from pcii.types.photon_counts import PhotonCounts
 

@@ -28,13 +28,13 @@ Method = Callable[..., DepthMap]
 
 FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
-    "sweep-17": "pcii.baselines.textbook_depth:likelihood_sweep",
-    "variance-sweep": "pcii.baselines.textbook_depth:variance_sweep",
+    "sweep-17": "pcii.depth.textbook_depth:likelihood_sweep",
+    "variance-sweep": "pcii.depth.textbook_depth:variance_sweep",
 }
 FOR_VIEWS: dict[str, Method | str] = {
     "posterior": FOR_COUNTS["posterior"],
     "variance-sweep": FOR_COUNTS["variance-sweep"],
-    "structure-tensor": "pcii.baselines.textbook_depth:structure_tensor",
+    "structure-tensor": "pcii.depth.textbook_depth:structure_tensor",
 }
 """The built-in methods by what they take; those to compare with are loaded when they are asked for."""
 DEFAULT_METHOD = "posterior"

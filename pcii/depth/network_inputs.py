@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.evidence.texture_evidence import TextureEvidence
-from pcii.imaging.blocks import block_sums
 
 CELL_SIDE_BLOCKS = 2
 """Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import box_around, on_pixels, window_sums
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.sheets import SheetModel, cut_sheets
 from pcii.depth.smooth_surface import SurfacePrior
@@ -18,8 +19,6 @@ from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.shown_depth import ShownDepth
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
-from pcii.imaging.blocks import on_pixels, window_sums
-from pcii.imaging.bright_regions import box_around
 from pcii.sections.dense_sections import in_memory
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior

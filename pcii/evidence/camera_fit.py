@@ -14,8 +14,8 @@ from functools import cache
 
 import numpy as np
 
+from pcii.base.blocks import block_sums, evenly_chosen
 from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
-from pcii.imaging.blocks import block_sums, evenly_chosen
 from pcii.store.dataset_writer import check_depth_range
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.geometry import depth_of_total_disparity_mm, parallax_per_total, total_disparity_px

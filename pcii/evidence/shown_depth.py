@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pcii.base.blocks import block_sums, on_pixels, window_sums
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.imaging.blocks import block_sums, on_pixels, window_sums
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import parallax_per_total
 from pcii.types.images import Views

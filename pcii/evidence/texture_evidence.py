@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.imaging.blocks import block_sums, sum_of
+from pcii.base.blocks import block_sums, sum_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views, binary_scale

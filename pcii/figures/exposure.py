@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.figures.pictures import to_srgb8, white_level
-from pcii.imaging.blocks import block_sums
 
 PANEL_PX = 320
 """Pictures with longer sides are drawn in blocks of 2 x 2 pixels or more: a panel has about as many dots on a

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pcii.base.blocks import evenly_chosen
 from pcii.base.errors import InputError
 from pcii.base.plain_text import in_html
 from pcii.figures.exposure import PANEL_PX, block_px, exposed, photon_picture
@@ -29,7 +30,6 @@ from pcii.figures.panels import (
     write_in_middle,
 )
 from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, depth_image
-from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -74,8 +74,8 @@ def find_method(method: str | plugins.Method) -> plugins.Method:
 METHODS: dict[str, plugins.Method | str] = {
     "three-step": ThreeStep(),
     "posterior": remove_by_network,
-    "brightness": "pcii.baselines.simple_removals:brightness",
-    "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",
+    "brightness": "pcii.removal.simple_removals:brightness",
+    "shape-from-focus": "pcii.removal.simple_removals:shape_from_focus",
 }
 """The built-in methods; those to compare with are loaded when they are asked for."""
 REGISTRY = MethodRegistry(plugins.GROUP, METHODS, plugins.checked)

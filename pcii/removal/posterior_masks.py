@@ -7,9 +7,9 @@ probable one. Nothing is claimed where the depth map has no answer.
 
 import numpy as np
 
+from pcii.base.blocks import on_pixels
 from pcii.depth.depth_planes import check_search
 from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.imaging.blocks import on_pixels
 from pcii.types.estimates import DepthPosterior, Segmented
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.imaging.blocks import sum_of
+from pcii.base.blocks import sum_of
 from pcii.types.bayer import colour_index
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views

@@ -11,8 +11,8 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.imaging import block_sums, boundary_f, on_pixels
-from pcii.metrics import mask_agreement
+from pcii.base import block_sums, on_pixels
+from pcii.metrics import boundary_f, mask_agreement
 from pcii.sections import view_samples
 from pcii.types import PATTERNS, FocalPlanes, Light, photon_rates, scope_energies
 

@@ -17,7 +17,7 @@ from pcii.evaluation import NamedMethod, evaluate, read_rows, software_of
 from pcii.evaluation.rows import writing_rows
 from pcii.store import machine, own_software
 
-COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
+COMPUTES = ("base", "types", "sections", "evidence", "depth", "removal", "metrics")
 DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}
 CODE = """
 from pcii import DepthMap, Segmented

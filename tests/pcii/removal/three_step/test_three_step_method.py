@@ -16,8 +16,7 @@ from twins import (
 
 import pcii
 from pcii.base import InputError
-from pcii.imaging import cheapest_planes, pieces_along_ridges
-from pcii.removal.three_step import ThreeStep
+from pcii.removal.three_step import ThreeStep, cheapest_planes, pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.variance_threshold import adaptive_threshold
 from pcii.sections import with_probes

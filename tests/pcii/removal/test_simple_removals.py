@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import even_light, intersection_over_union, unit_grid
 
-from pcii.baselines.simple_removals import sum_modified_laplacian
 from pcii.removal import segment
+from pcii.removal.simple_removals import sum_modified_laplacian
 from pcii.types import PhotonCounts
 
 
