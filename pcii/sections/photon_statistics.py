@@ -20,7 +20,8 @@ from pcii.base.blocks import sum_of
 from pcii.types.bayer import colour_index
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
-from pcii.types.photon_counts import NEGLIGIBLE_LOSS, PhotonCounts, Readout
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.readout import NEGLIGIBLE_LOSS, Readout
 from pcii.types.section_stack import Sections
 
 GREY_LEVELS = 256
