@@ -224,9 +224,9 @@ def verify(dataset: Path, *, json: Json = False) -> None:
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
     """
-    from pcii.store.verification import verify_and_tell
+    from pcii.store.verification import print_verification
 
-    verify_and_tell(dataset, as_json=json)
+    print_verification(dataset, as_json=json)
 
 
 def main() -> int:
