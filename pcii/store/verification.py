@@ -1,8 +1,7 @@
 """Comparison of all files of a dataset, a collection, results or an evaluation with its manifest."""
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 
 from pcii.base.command_line import answer_json, say
 from pcii.base.errors import InputError
@@ -23,6 +22,7 @@ from pcii.store.folders import (
     LOCK,
     RESULTS,
     ROWS,
+    Files,
     entries,
     read_evaluation,
     read_listed,
@@ -38,7 +38,7 @@ def verify(path: Path, report: Report = silent) -> int:
     Returns the number of files. Raises `InputError` for the first file that is missing, truncated or changed,
     and for files that no manifest lists.
     """
-    documents, files, datasets = _contents(path)
+    document, files, datasets, unlisted = _contents(path)
     total = len(files) + len(datasets)
     count = 2 if is_collection(path) else len(files)  # of a collection its recipe and its index
     for done, (name, entry) in enumerate(files.items(), start=1):
@@ -47,27 +47,28 @@ def verify(path: Path, report: Report = silent) -> int:
     for done, dataset in enumerate(datasets, start=len(files) + 1):
         count += 1 + verify(dataset)
         report("verify", done, total)
-    within = tuple(f"{dataset.name}/" for dataset in datasets)
-    unlisted = [name for name in unlisted_files(path, [*documents, *files]) if not name.startswith(within)]
     if unlisted:
         advice = "repeat the command if they are unfinished, else move them away"
-        raise InputError(f"{path}: not listed in {documents[0]}: {', '.join(unlisted)}; {advice}")
+        raise InputError(f"{path}: not listed in {document}: {', '.join(sorted(unlisted))}; {advice}")
     return count
 
 
-def _contents(path: Path) -> tuple[list[str], Mapping[str, Mapping[str, Any]], list[Path]]:
-    """What a folder has: files that no list names, the one that lists the others first; the listed files; and
-    the datasets of a collection, whose manifests are those that the index lists.
-    """
+def _contents(path: Path) -> tuple[str, Files, list[Path], Collection[str]]:
+    """What lists the contents of a folder, the files and the datasets that it lists, and what it does not."""
     if is_collection(path):
         read_collection(path)
         datasets = [check_manifest(path, row) for row in read_index(path)]
-        return [INDEX, COLLECTION, LOCK, CARD, LICENCE, CERTIFICATE, CROISSANT], {}, datasets
-    if (path / MANIFEST).exists() or not {RESULTS, ROWS} & entries(path, "dataset"):
-        return [MANIFEST, CARD, LICENCE], read_manifest(path).files, []
-    if (path / RESULTS).exists():
-        return [RESULTS, CARD, LICENCE], read_results(path).files, []
-    return [EVALUATION, CARD, LICENCE], read_evaluation(path).files, []
+        known = {INDEX, COLLECTION, LOCK, CARD, LICENCE, CERTIFICATE, CROISSANT}
+        known |= {dataset.name for dataset in datasets}
+        return INDEX, {}, datasets, entries(path, "collection") - known
+    document, files = MANIFEST, None
+    if not (path / MANIFEST).exists():
+        if (path / RESULTS).exists():
+            document, files = RESULTS, read_results(path).files
+        elif (path / ROWS).exists():
+            document, files = EVALUATION, read_evaluation(path).files
+    files = read_manifest(path).files if files is None else files
+    return document, files, [], unlisted_files(path, [document, *files, CARD, LICENCE])
 
 
 def print_verification(path: Path, *, as_json: bool) -> None:
