@@ -435,7 +435,7 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         ),
         "import_counts": (
             "import_counts",
-            _of_light(lambda case: pcii.import_counts(case.counts_KLHW(), case.optics, tell=_nothing)),
+            _of_light(lambda case: pcii.import_counts(case.counts_KLHW(), case.optics, note=_nothing)),
         ),
         "import_images": ("import_images", _of_light(_images)),
         "import_lens_array": ("import_lens_array", _of_light(_lens_array)),

@@ -14,7 +14,7 @@ from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
-from pcii.exchange.export_command import export
+from pcii.exchange.export_formats import export
 from pcii.store.dataset import copy_sample
 from pcii.store.verification import print_verification
 

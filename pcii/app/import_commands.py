@@ -24,7 +24,7 @@ from pcii.exchange.import_requests import (
     WholePair,
     read,
 )
-from pcii.exchange.stated_cameras import Tell, ViewOrder
+from pcii.exchange.stated_cameras import Note, ViewOrder
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
@@ -123,7 +123,7 @@ def import_dataset(
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
-        imported = read(source, options, report=report, tell=notes.append)
+        imported = read(source, options, report=report, note=notes.append)
         images: list[Views | PhotonCounts] = [imported.images]
         origin = imported.origin
         if photons is not None:
@@ -162,7 +162,7 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | PhotonCounts:
+def _without_hot_pixels(images: Views | PhotonCounts, note: Note) -> Views | PhotonCounts:
     """Counts to judge the cameras by: hot pixels, which stand still in all views, would be sharp at infinity.
 
     Says how many there are. Warns of frames that are saturated.
@@ -175,18 +175,18 @@ def _without_hot_pixels(images: Views | PhotonCounts, tell: Tell) -> Views | Pho
     cleaned, hot = without_hot_pixels(images, FocalPlanes.at_depths(grid, moving_mm))
     if hot:
         share = f"{hot} of {grid.height * grid.width} pixels"
-        tell(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
+        note(f"{share} are far brighter than all around them in most views: hot, or points at infinity")
     return cleaned
 
 
-def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, tell: Tell) -> tuple[float, ...]:
+def _surfaces_of(images: Views | PhotonCounts, z_range: Pair, note: Note) -> tuple[float, ...]:
     """Depths of the surfaces of photon counts within a range, in whose noise contrast is no sure sign."""
     if isinstance(images, Views) or z_range is None or images.grid.view_count < 2:
         return ()
     depths_mm, sure = find_surfaces(images, z_range)
     if depths_mm:
         names = ", ".join(map(three_digits, depths_mm))
-        tell(f"the depth map has most surfaces at {names} mm; {right_share(images.grid, depths_mm, sure)}")
+        note(f"the depth map has most surfaces at {names} mm; {right_share(images.grid, depths_mm, sure)}")
     return depths_mm
 
 

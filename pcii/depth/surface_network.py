@@ -33,7 +33,7 @@ REQUESTED_GAIN, REQUESTED_SIGMA = 2.0, 2.0
 standard deviation in planes. With a larger gain or a smaller deviation depth is better in little
 light, and worse where objects are at planes that nobody requested (docs/experiments/depth.md)."""
 MIN_NEAR = 1e-3
-"""Added to the probabilities of depths near a plane: of what the depth excludes, shapes may still tell."""
+"""Added to the probabilities of depths near a plane: shapes may still show what the depth excludes."""
 
 
 class NetworkOutputs(NamedTuple):

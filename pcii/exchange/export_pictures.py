@@ -193,7 +193,7 @@ def depths_ahead_mm(dataset: Dataset) -> np.ndarray | None:
 def intrinsics_of(dataset: Dataset) -> dict[str, Any]:
     """Members at the top of the file: focal length in px, size and, where all cameras share it, centre.
 
-    In a sheared grid each camera has a centre of its own, which its frame tells: nerfstudio would take one at
+    In a sheared grid each camera has a centre of its own, which its frame has: nerfstudio would take one at
     the top for all. The grid in mm is written too, unless the cameras have errors of calibration.
     """
     grid = dataset.grid

@@ -27,7 +27,7 @@ from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
 from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
-from pcii.exchange.stated_cameras import Optics, Tell, warn
+from pcii.exchange.stated_cameras import Note, Optics, warn
 from pcii.store.dataset import Dataset
 from pcii.store.folders import read_small
 from pcii.types.truth import Truth
@@ -51,13 +51,13 @@ def import_hci(
     encoding: Encoding | None = None,
     cfa: str | None = None,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> KnownViews:
     """Views, cameras and true depth of a folder of the HCI 4D light field benchmark.
 
     The folder has parameters.cfg, input_Cam000.png and so on row by row, and maybe gt_depth_lowres.pfm (m)
     or gt_disp_lowres.pfm (px). These maps are of the middle view, which is the virtual centre of an odd grid
-    only: of an even grid there is no truth. For `encoding` and `cfa` see `pcii.import_images`; `tell` takes
+    only: of an even grid there is no truth. For `encoding` and `cfa` see `pcii.import_images`; `note` takes
     the names of files and parameters that are not used. Raises `InputError` for what is missing or wrong.
     """
     root = Path(folder)
@@ -75,7 +75,7 @@ def import_hci(
         pitch_mm=(baseline_mm, baseline_mm), focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=(shear, shear)
     )
     others: list[str] = []  # files that are no views are named with those of the benchmark
-    options = {"encoding": encoding, "cfa": cfa, "report": report, "tell": others.append}
+    options = {"encoding": encoding, "cfa": cfa, "report": report, "note": others.append}
     views = import_images(root, PATTERN, optics, grid=(rows, cols), **options)
     if views.grid.shape_HW != (height, width):
         raise InputError(
@@ -96,7 +96,7 @@ def import_hci(
     truth = None
     maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
     if maps and (rows % 2 == 0 or cols % 2 == 0):
-        tell(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
+        note(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
     elif maps:
         picture = picture_of(root / maps[0], ["PFM"])
         if picture.shape[:2] != (height, width):
@@ -107,13 +107,13 @@ def import_hci(
         if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
             raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
         truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
-        tell(f"with the true depth of the virtual centre, {maps[0]}")
+        note(f"with the true depth of the virtual centre, {maps[0]}")
     files = {path.name for path in root.iterdir() if path.is_file()}
     unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})
     if unused:
-        tell(f"not used: {listed_names(unused)}")
+        note(f"not used: {listed_names(unused)}")
     if known.texts:
-        tell(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
+        note(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
     return KnownViews(views, truth, z_range_mm=(near, far) if 0 < near < far < math.inf else None)
 
 

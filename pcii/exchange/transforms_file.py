@@ -21,7 +21,7 @@ from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
 from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
-from pcii.exchange.stated_cameras import Tell, warn
+from pcii.exchange.stated_cameras import Note, warn
 from pcii.store.folders import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
@@ -117,11 +117,11 @@ def transforms_in(source: Path) -> Path | None:
     return source / TRANSFORMS if (source / TRANSFORMS).is_file() else None
 
 
-def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
+def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     """Read a transforms.json of anybody, or that of a folder.
 
     A picture is opened only where the file does not say its size. Intrinsics of a frame win over those at the
-    top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `tell`
+    top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `note`
     takes the names of members that are not used. Raises `InputError`, naming file and member, for what is
     missing or wrong, pixels that are not square, lenses that distort, frames of different size or focal
     length, matrices that are no poses, paths that are used twice or lead out of the folder, photon cubes that
@@ -164,7 +164,7 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     if not has_cubes:
         unused |= {name: 0 for name in ("cfa", "c") if getattr(document, name) is not None}
     if unused:
-        tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
+        note(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
         path=file,
         poses=poses,

@@ -1,7 +1,7 @@
 """Frames of a single-photon camera, and the photons that their counts stand for.
 
 A single-photon camera divides the exposure into T equal frames. In each a pixel stops at m = 2^bits - 1
-counts; of one bit it tells whether there was a photon at all. With mu photons expected in a frame the number
+counts; of one bit it shows whether there was a photon at all. With mu photons expected in a frame the number
 of frames with a photon is binomial, of T with the probability 1 - exp(-mu) (Fossum, "What to do with sub-
 diffraction-limit pixels? A proposal for a gigapixel digital film sensor", 2005; Yang et al., "Bits from
 photons", IEEE Trans. Image Process. 21, 2012).

@@ -61,7 +61,7 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
     factor = 0.025 * 100.0 * W
     disparity = (factor * 4.25 / depth_m - factor) / 4.25 / 35.0
     pfm(root / name, depth_m if "depth" in name else disparity, scale)
-    scene = import_hci(root, tell=[].append)
+    scene = import_hci(root, note=[].append)
     grid = scene.views.grid
     assert (grid.rows, grid.cols, grid.pitch_mm) == (3, 3, (25.0, 25.0))
     assert scene.truth is not None
@@ -89,7 +89,7 @@ def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Pat
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
     told: list[str] = []
-    scene = import_hci(root, tell=told.append)
+    scene = import_hci(root, note=told.append)
     assert scene.truth is None
     assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
@@ -128,12 +128,12 @@ def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path,
     path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
     optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)
     lenses = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=inverted)
-    found = import_lens_array(path, lenses, optics, tell=pytest.fail)
+    found = import_lens_array(path, lenses, optics, note=pytest.fail)
     assert found.grid == GRID
     np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
     assert check_grid(found, (15, 100)).order is None
     told: list[str] = []
-    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, tell=told.append)
+    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=told.append)
     assert told == ["not used: room for 2 more columns and 1 more rows of lens images"]
     mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
     wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))

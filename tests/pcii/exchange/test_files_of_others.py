@@ -29,7 +29,7 @@ def test_a_gamma_that_is_not_used_is_named(tmp_path: Path, value: float, unused:
     (tmp_path / "0_0.png").write_bytes(gamma(value))
     (tmp_path / "._0_0.png").write_bytes(b"\0\5\x16\7")  # what macOS leaves beside files
     told: list[str] = []
-    views = import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", tell=told.append)
+    views = import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", note=told.append)
     np.testing.assert_allclose(views.view(0, 0)[..., 0], (GREY >> 8) / 255, rtol=1e-6)
     assert told == unused
 
@@ -88,7 +88,7 @@ def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> Non
         assert (counts.cfa, counts.readout.frames) == ("GRBG", 5)
         assert (counts.frame is not None) == (array is BITS)  # of one bit the frame of each count is kept
     np.save(tmp_path / "0_0.npy", array[0, 0, 0])  # one frame without an axis of frames
-    single = import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", tell=[].append)
+    single = import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", note=[].append)
     np.testing.assert_array_equal(single.view(0, 0), array[0, 0, 0])
 
 
@@ -110,12 +110,12 @@ def test_pictures_that_do_not_keep_counts_are_refused(tmp_path: Path, ending: st
     signed: dict[str, Any] = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
     tifffile.imwrite(tmp_path / "0_0.tif", (COUNTS[0, 0] + 32768).astype(np.uint16), **signed)
     with pytest.raises(InputError, match=words):
-        import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", tell=[].append)
+        import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", note=[].append)
 
 
 def test_frames_of_0_and_255_are_warned_of() -> None:
     told: list[str] = []
-    import_counts((255 * BITS).astype(np.uint8), OPTICS, tell=told.append)
+    import_counts((255 * BITS).astype(np.uint8), OPTICS, note=told.append)
     gain = "if that is one photon, give --gain 255"
     assert told == [f"warning: all numbers of array are multiples of 255; {gain}"]
 
@@ -130,7 +130,7 @@ def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
     (root / "valid.png").write_bytes(b"")
     told: list[str] = []
-    scene = import_hci(root, tell=told.append)
+    scene = import_hci(root, note=told.append)
     assert scene.views.grid.focal_mm == 100
     assert told[1:] == ["not used: valid.png", "not used of parameters.cfg: authors"]
     assert scene.truth is not None

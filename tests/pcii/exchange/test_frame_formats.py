@@ -25,7 +25,7 @@ BITS = RNG.random((2, 2, FRAMES, H, W)) < 0.3
 
 def told_of(source: Any, **options: Any) -> tuple[pcii.PhotonCounts, list[str]]:
     told: list[str] = []
-    return import_counts(source, OPTICS, tell=told.append, **options), told
+    return import_counts(source, OPTICS, note=told.append, **options), told
 
 
 def test_frames_of_0_and_1_are_frames_of_one_bit() -> None:

@@ -130,7 +130,7 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
     first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
     with pytest.warns(UserWarning, match=r"not used: 1 more pictures in 0_0\.jpg"):
-        views = import_images(tmp_path, PATTERN % "jpg", OPTICS, tell=warnings.warn)
+        views = import_images(tmp_path, PATTERN % "jpg", OPTICS, note=warnings.warn)
     np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
     spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
     for name, profile in spaces:
@@ -138,16 +138,16 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
         first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
     told: list[str] = []
     for profile in ("srgb", "other"):
-        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=told.append)
     linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
     first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
-    import_images(tmp_path, "{col}_{row}.gimp.png", OPTICS, tell=told.append)
+    import_images(tmp_path, "{col}_{row}.gimp.png", OPTICS, note=told.append)
     named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
     assert [one for one in told if "profile" in one] == named
     raw = np.full((H, W), 500, np.uint16)
     tags = [(33422, "B", 4, b"\x02\x01\x01\x00", False), (50714, "H", 1, 256, False)]
     tifffile.imwrite(tmp_path / "0_0.tif", raw, extratags=tags)
-    import_images(tmp_path, "{col}_{row}.tif", OPTICS, tell=told.append)
+    import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=told.append)
     assert told[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
     np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
     with pytest.raises(InputError, match="holds numbers up to 255; encoded light is 1 at white"):

@@ -43,7 +43,7 @@ def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
     """Counts of packed frames in memory."""
     frames, width = (span[0], span[1] - 1), bits.shape[4]
     stored = FrameFormat(bitpack=True, width=width)
-    return import_counts(packed(bits), OPTICS, frames=frames, stored=stored, tell=[].append)
+    return import_counts(packed(bits), OPTICS, frames=frames, stored=stored, note=[].append)
 
 
 def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
@@ -91,7 +91,7 @@ def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kept", ["files", "one file", "counted file"])
 def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     pattern, source = None, tmp_path / "all.npy"
-    options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "tell": [].append}
+    options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "note": [].append}
     if kept == "files":
         pattern, source = "{row}_{col}.npy", files_of(tmp_path / "views", BITS)
     elif kept == "one file":
@@ -108,12 +108,12 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
 @pytest.mark.parametrize("share", [0.01, 0.3])
 def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
     rng, told = np.random.default_rng(1), []
-    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, tell=told.append)
+    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=told.append)
     assert told == [
         "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
     ]
     counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
-    import_counts(counts, OPTICS, tell=told.append)
+    import_counts(counts, OPTICS, note=told.append)
     assert len(told) == 1
 
 
@@ -124,7 +124,7 @@ def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None
 def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
     bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
-    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), tell=told.append)
+    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=told.append)
     words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
     assert told == ([] if advice is None else [words])
 

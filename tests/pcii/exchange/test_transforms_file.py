@@ -56,7 +56,7 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
     path.write_text(path.read_text(), "utf-16")
     told: list[str] = []
-    file = read_transforms(path, tell=told.append)
+    file = read_transforms(path, note=told.append)
     assert told == ["not used of transforms.json: aabb_scale, sharpness"]
     assert (file.height, file.width, file.focal_px) == (H, W, pytest.approx(50))
     assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]
@@ -109,7 +109,7 @@ def test_one_member_of_any_kind_gives_a_grid_or_one_sentence(tmp_path_factory, d
     path = tmp_path_factory.mktemp("odd") / "transforms.json"
     path.write_text(json.dumps(document))
     try:
-        file = read_transforms(path, tell=[].append)
+        file = read_transforms(path, note=[].append)
         found = camera_grid_of(file, find_grid(file), None, None, None, [].append).view_count
     except InputError as fault:
         found = str(fault)
