@@ -62,18 +62,7 @@ def import_hci(
     """
     root = Path(folder)
     known = _Parameters(root / PARAMETERS)
-    rows, cols, height, width = (
-        int(known.number(name, 1))
-        for name in ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
-    )
-    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
-    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(width, height)
-    focus_m = known.number("focus_distance_m")
-    parallax_px_mm = focal_mm * baseline_mm / pixel_mm
-    shear = parallax_px_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
-    optics = Optics(
-        pitch_mm=(baseline_mm, baseline_mm), focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=(shear, shear)
-    )
+    (rows, cols, height, width), optics = _stated_cameras(known)
     others: list[str] = []  # files that are no views are named with those of the benchmark
     options = {"encoding": encoding, "cfa": cfa, "report": report, "note": others.append}
     views = import_images(root, PATTERN, optics, grid=(rows, cols), **options)
@@ -82,31 +71,13 @@ def import_hci(
             f"{root / PARAMETERS}: image_resolution is {height} x {width} px, and the views are "
             f"{views.grid.height} x {views.grid.width}, rows x columns"
         )
-
-    def depth_mm(disparity_px: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore"):
-            return parallax_px_mm / (np.asarray(disparity_px, np.float64) + shear)
-
-    # A missing end, or nan as exports have it where no depths are known, says nothing.
-    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
-    try:
-        far, near = (float(depth_mm(np.array(float(end)))) for end in ends)
-    except ValueError:
-        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
-    truth = None
+    z_range_mm = _range_mm(known, optics)
     maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
+    truth = None
     if maps and (rows % 2 == 0 or cols % 2 == 0):
         note(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
     elif maps:
-        picture = picture_of(root / maps[0], ["PFM"])
-        if picture.shape[:2] != (height, width):
-            raise InputError(f"{picture.path}: is {picture.layout()}, and the views {height} x {width} px")
-        numbers = next(decode(picture))[..., 0].astype(np.float64)
-        z_mm = 1000 * numbers if maps[0] == DEPTH else depth_mm(numbers)
-        is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
-        if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
-            raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
-        truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
+        truth = _true_depth(root / maps[0], (height, width), optics)
         note(f"with the true depth of the virtual centre, {maps[0]}")
     files = {path.name for path in root.iterdir() if path.is_file()}
     unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})
@@ -114,7 +85,50 @@ def import_hci(
         note(f"not used: {listed_names(unused)}")
     if known.texts:
         note(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
-    return KnownViews(views, truth, z_range_mm=(near, far) if 0 < near < far < math.inf else None)
+    return KnownViews(views, truth, z_range_mm)
+
+
+def _stated_cameras(known: "_Parameters") -> tuple[tuple[int, ...], Optics]:
+    """Rows and columns of cameras, height and width of images; and the optics."""
+    names = ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
+    shape = tuple(int(known.number(name, 1)) for name in names)
+    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
+    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(shape[2:])
+    focus_m = known.number("focus_distance_m")
+    shear = focal_mm * baseline_mm / pixel_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
+    pitch_mm, shear_px = (baseline_mm, baseline_mm), (shear, shear)
+    return shape, Optics(pitch_mm=pitch_mm, focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=shear_px)
+
+
+def _depth_mm(optics: Optics, disparity_px: np.ndarray) -> np.ndarray:
+    """Depths in mm of disparities in px; infinite for that of the shear."""
+    assert optics.pixel_mm is not None
+    parallax_px_mm = optics.focal_mm * optics.pitch_mm[0] / optics.pixel_mm
+    with np.errstate(divide="ignore"):
+        return parallax_px_mm / (np.asarray(disparity_px, np.float64) + optics.shear_px[0])
+
+
+def _range_mm(known: "_Parameters", optics: Optics) -> tuple[float, float] | None:
+    """Nearest and farthest depth; a missing end says nothing, nor does nan, by which exports say so."""
+    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
+    try:
+        far, near = (float(_depth_mm(optics, np.array(float(end)))) for end in ends)
+    except ValueError:
+        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
+    return (near, far) if 0 < near < far < math.inf else None
+
+
+def _true_depth(path: Path, shape_HW: tuple[int, int], optics: Optics) -> Truth:
+    """The truth of a map of depth or disparity; `InputError`, naming it, for another size or wrong depths."""
+    picture = picture_of(path, ["PFM"])
+    if picture.shape[:2] != shape_HW:
+        raise InputError(f"{path}: is {picture.layout()}, and the views {shape_HW[0]} x {shape_HW[1]} px")
+    numbers = next(decode(picture))[..., 0].astype(np.float64)
+    z_mm = 1000 * numbers if path.name == DEPTH else _depth_mm(optics, numbers)
+    is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
+    if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
+        raise InputError(f"{path}: holds depths that are not between 0.1 mm and 100 km")
+    return Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
 
 
 class _Parameters:
