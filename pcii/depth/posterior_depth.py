@@ -18,7 +18,12 @@ from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.shown_depth import ShownDepth
-from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
+from pcii.evidence.texture_evidence import (
+    PHOTON_CELL_BLOCKS,
+    TextureEvidence,
+    TextureModel,
+    evidence_of_texture,
+)
 from pcii.sections.dense_sections import in_memory
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
@@ -154,8 +159,7 @@ class PosteriorDepth:
     ) -> DepthPosterior:
         """The posterior, whose most probable depths are `total_px`, after sheets explain the photons of all
         cameras."""
-        from pcii.depth.explained_views import explain
-        from pcii.depth.posterior_of_sheets import posterior_after
+        from pcii.depth.explained_views import explain, posterior_after
 
         model = self.sheets
         sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), model)
@@ -249,8 +253,8 @@ class PosteriorDepth:
         enough = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
         if not enough.any():
             return None
-        margin = self.margin_blocks // CELL_BLOCKS
-        step = MULTIPLE // CELL_BLOCKS
+        margin = self.margin_blocks // PHOTON_CELL_BLOCKS
+        step = MULTIPLE // PHOTON_CELL_BLOCKS
         rows, cols = (
             slice(axis.start // step * MULTIPLE, -(-axis.stop // step) * MULTIPLE)
             for axis in box_around(enough, (margin, margin))
@@ -259,12 +263,12 @@ class PosteriorDepth:
 
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""
-        i, j = (np.arange(size) // CELL_BLOCKS for size in best.shape)
+        i, j = (np.arange(size) // PHOTON_CELL_BLOCKS for size in best.shape)
         return self._photons_around(photons, block_px)[best, i[:, None], j] >= self.least_photons
 
     def _photons_around(self, photons: np.ndarray, block_px: int) -> np.ndarray:
         """Photons (Z, h / 4, w / 4) in a Gaussian window of weight 1 at its centre."""
-        return window_sums(photons, self.window_px / (block_px * CELL_BLOCKS))
+        return window_sums(photons, self.window_px / (block_px * PHOTON_CELL_BLOCKS))
 
 
 def _ends_px(
@@ -318,7 +322,7 @@ def _in_four(evidence: TextureEvidence, shape_HW: tuple[int, int]) -> TextureEvi
     """The evidence of each block on four blocks of a quarter of its area, as many as cover the film."""
     h, w = shape_HW
     nats, sums, samples = (on_pixels(part, 2, (h, w)) / np.float32(4) for part in evidence[:3])
-    cells = -(-h // CELL_BLOCKS), -(-w // CELL_BLOCKS)
+    cells = -(-h // PHOTON_CELL_BLOCKS), -(-w // PHOTON_CELL_BLOCKS)
     return TextureEvidence(nats, sums, samples, on_pixels(evidence.photons, 2, cells) / np.float32(4))
 
 

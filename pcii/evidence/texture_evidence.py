@@ -74,7 +74,7 @@ planes up to 2 px of total disparity apart have the same shifts. With 3/4 the er
 size and twice the frequency, the least for one number for all cameras. The section lies 1/4 px off, an eighth
 of a block.
 """
-CELL_BLOCKS = 4
+PHOTON_CELL_BLOCKS = 4
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
 """What is divided by where there are no samples, or no light."""
 
@@ -106,10 +106,11 @@ def evidence_of_texture(
         number = colours * _samples_of_blocks(single, 0, block_px), _samples_of_blocks(single, 1, block_px)
         sums[plane] = blocks[0][:h, :w]
         np.outer(number[0][:h], number[1][:w], out=samples[plane])
-        of_cells, spread = (block_sums(part, CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1]))
-        return _of_section(blocks, number, chosen, least_samples), of_cells**2 / np.maximum(
-            spread, LEAST_RATE
+        of_cells, spread = (
+            block_sums(part, PHOTON_CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1])
         )
+        photons = of_cells**2 / np.maximum(spread, LEAST_RATE)
+        return _of_section(blocks, number, chosen, least_samples), photons
 
     octaves, photons = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
     largest = [reduce(np.maximum, each).clip(min=0) for each in zip(*octaves, strict=True)]
@@ -138,7 +139,7 @@ def _block_sums(
 
     def in_blocks(values: np.ndarray) -> np.ndarray:
         blocks = block_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
-        return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
+        return np.pad(blocks, [(0, -size % PHOTON_CELL_BLOCKS) for size in blocks.shape])
 
     section = reconstruct(data, plane, variance=isinstance(data, Views))
     if section.variance is None:  # it is that of a Poisson variable, its mean
@@ -154,7 +155,7 @@ def _samples_of_blocks(plane: FocalPlanes, axis: int, block_px: int) -> np.ndarr
     # The pixels of a shifted row before each edge.
     before = np.clip(edges - np.maximum(shift, 0)[:, None], 0, np.maximum(size - np.abs(shift), 0)[:, None])
     blocks = np.diff(before.sum(axis=0)).astype(np.float32)
-    return np.pad(blocks, (0, -blocks.size % CELL_BLOCKS))
+    return np.pad(blocks, (0, -blocks.size % PHOTON_CELL_BLOCKS))
 
 
 def _of_section(

@@ -4,8 +4,7 @@ from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
 from pcii.depth import SheetModel
-from pcii.depth.explained_views import ExplainedViews, Explanation
-from pcii.depth.posterior_of_sheets import posterior_after
+from pcii.depth.explained_views import ExplainedViews, Explanation, posterior_after
 from pcii.depth.sheet_kernels import expect_photons, reach_sheets
 from pcii.depth.sheets import Sheets, cut_sheets
 from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
