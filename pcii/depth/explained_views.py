@@ -263,7 +263,7 @@ def posterior_after(
     without depth. Where nothing changes the posterior does not either.
     """
     before, after = (_with_nothing(visible) for visible in (explained.before, explained.after))
-    growth = _of_depths(sheets, after, least) / _of_depths(sheets, before, least)
+    growth = _by_depth(sheets, after, least) / _by_depth(sheets, before, least)
     in_focus = _in_focus_after(posterior.in_focus, sheets, before, growth)
     probability, no_surface = posterior.probability.copy(), posterior.no_surface.copy()
     planes_px = posterior.planes.total_disparity_px
@@ -280,11 +280,11 @@ def _with_nothing(visible: np.ndarray) -> np.ndarray:
     return np.concatenate([visible, 1 - visible.sum(axis=0, keepdims=True)])
 
 
-def _of_depths(sheets: Sheets, visible: np.ndarray, least: float) -> np.ndarray:
+def _by_depth(sheets: Sheets, visible: np.ndarray, least: float) -> np.ndarray:
     """The probability (L + 1, h, w) that a sheet, or another at its depth, is what is seen, more by `least`;
     and of the light without depth."""
     depths, same_px = sheets.total_px, sheets.same_px
-    near = [(visible[:-1] * (np.abs(depths - own) < same_px)).sum(axis=0) for own in depths]
+    near = [(visible[:-1] * (np.abs(depths - depth) < same_px)).sum(axis=0) for depth in depths]
     return np.stack([*near, visible[-1]]) + np.float32(least)
 
 
@@ -293,9 +293,10 @@ def _in_focus_after(
 ) -> np.ndarray:
     """Probabilities (R, h, w) of being in focus, each times the mean `growth` of its sheets, normalised."""
     weight = before + np.finfo(np.float32).eps
-    of_none = np.append(~sheets.is_at.any(axis=0), True)
-    rows = [np.append(own, False) for own in sheets.is_at] + [of_none]
+    # The sheets of each requested plane, then those of no plane and the light without depth.
+    members = [np.append(is_at_plane, False) for is_at_plane in sheets.is_at]
+    members.append(np.append(~sheets.is_at.any(axis=0), True))
     claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
-    for probability, own in zip(claimed, rows, strict=True):
-        probability *= (weight[own] * growth[own]).sum(axis=0) / weight[own].sum(axis=0)
+    for probability, member in zip(claimed, members, strict=True):
+        probability *= (weight[member] * growth[member]).sum(axis=0) / weight[member].sum(axis=0)
     return claimed[:-1] / claimed.sum(axis=0)

@@ -8,14 +8,14 @@ network's weights are in `weights`; `training` has the commands that make them. 
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pcii.depth.network_inputs import NETWORK_CELL_BLOCKS, NetworkInputs
 
 if TYPE_CHECKING:
-    from onnxruntime import InferenceSession, RunOptions
+    from onnxruntime import InferenceSession
 
 WEIGHTS = Path(__file__).parent / "weights"
 MULTIPLE = 32
@@ -71,7 +71,7 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     blocks = batch["evidence"], batch["brightness"]
     rows = max(1, BAND_VALUES // (Z * w)) * NETWORK_CELL_BLOCKS
 
-    def run_band(top: int, options: "RunOptions | None" = None) -> None:
+    def run_band(top: int, options: Any = None) -> None:
         band = slice(top, min(top + rows, h))
         logit, mask = _run_head(head, cells, blocks, band, options)
         none[band], relative = _nothing_and_planes(logit, nothing[band])
@@ -90,7 +90,7 @@ def _run_head(
     cells: Sequence[np.ndarray],
     blocks: Sequence[np.ndarray],
     band: slice,
-    options: "RunOptions | None",
+    options: Any,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The logits of planes and of masks at planes, (Z, rows, w), of a band of rows of blocks.
 
