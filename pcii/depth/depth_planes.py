@@ -1,4 +1,4 @@
-"""Planes that a search of depth compares, and the depths at which a depth map has most surfaces."""
+"""Checks of the depths that are searched: those of a range, and of requested planes."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,10 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.types.arrays import check_z_mm
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap
-from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
+from pcii.types.geometry import disparity_px, total_disparity_px
 
 MOST_SPAN_PX = 2000.0
 """Largest change of total disparity between the ends of a range that is searched."""
-MODE_PX, LEAST_MODE, MOST_MODES = 2.0, 0.08, 4
-"""What is nearer in total disparity is in focus together: a blur half-extent of a pixel. The least share of a
-depth map that makes a plane worth looking at, and the number of planes that a report has room for."""
 SMALL_FILM_PX = 256
 """Parallax in px from camera to camera up to which depths are searched on films of any size."""
 
@@ -46,26 +42,3 @@ def check_search(grid: CameraGrid, name: str, z_mm: np.ndarray) -> None:
     axes = zip(disparity_px(grid, far), sizes, (grid.cols, grid.rows), strict=True)
     if grid.view_count > 1 and not any(n > 1 and disparity < size for disparity, size, n in axes):
         raise InputError(f"{name}: up to {far:g} mm no two cameras see the same; choose a farther end")
-
-
-def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
-    """Depths in mm at which a depth map has most surfaces, from near to far; empty without an answer.
-
-    Around each is the largest share of the confidence that lies within `MODE_PX` of total disparity and
-    farther than twice that from the others, down to `LEAST_MODE`. At most `MOST_MODES`.
-    """
-    answered = np.isfinite(depth.z_mm)
-    total_px, weight = total_disparity_px(grid, depth.z_mm[answered]), depth.confidence[answered]
-    order = np.argsort(total_px)
-    total_px, weight = total_px[order], weight[order].astype(np.float64)
-    least, modes = LEAST_MODE * weight.sum(), list[float]()
-    while len(modes) < MOST_MODES and weight.any():
-        mass = np.concatenate([[0.0], np.cumsum(weight)])
-        ends = np.searchsorted(total_px, total_px + 2 * MODE_PX, side="right")
-        first = int(np.argmax(mass[ends] - mass[:-1]))
-        window = slice(first, int(ends[first]))
-        if (share := weight[window].sum()) < least:
-            break
-        modes.append(float(weight[window] @ total_px[window] / share))
-        weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
-    return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())

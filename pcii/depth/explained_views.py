@@ -172,13 +172,16 @@ class ExplainedViews:
         return T, photon_share
 
 
-def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> Explanation:
-    """What the photons say of sheets, after as many sweeps as raise the objective."""
-    views = ExplainedViews(counts, sheets, block_px, model)
+def explain_posterior(
+    counts: PhotonCounts, posterior: DepthPosterior, sheets: Sheets, model: SheetModel
+) -> DepthPosterior:
+    """The posterior after its sheets explain the photons, by as many sweeps as raise the objective."""
+    views = ExplainedViews(counts, sheets, posterior.block_px, model)
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
+    explanation = Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
+    return posterior_after(posterior, sheets, explanation, model.least)
 
 
 def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:

@@ -15,11 +15,13 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.depth_planes import check_range_mm, check_search, modes_mm
+from pcii.depth.depth_planes import check_range_mm, check_search
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
 from pcii.sections.photon_statistics import warn_of_saturation
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes, check_data
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -40,6 +42,9 @@ FOR_VIEWS: dict[str, Method | str] = {
 DEFAULT_METHOD = "posterior"
 """Of photon counts and of radiance."""
 BUILT_IN = FOR_COUNTS | FOR_VIEWS
+MODE_PX, LEAST_MODE, MOST_MODES = 2.0, 0.08, 4
+"""What is nearer in total disparity is in focus together: a blur half-extent of a pixel. The least share of a
+depth map that makes a plane worth looking at, and the number of planes that a report has room for."""
 
 
 def estimate_depth(
@@ -93,6 +98,29 @@ def find_surfaces(
     answered = np.isfinite(depth_map.z_mm)
     sure = float(depth_map.confidence[answered].mean()) if answered.any() else 0.0
     return modes_mm(depth_map, data.grid), sure
+
+
+def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
+    """Depths in mm at which a depth map has most surfaces, from near to far; empty without an answer.
+
+    Around each is the largest share of the confidence that lies within `MODE_PX` of total disparity and
+    farther than twice that from the others, down to `LEAST_MODE`. At most `MOST_MODES`.
+    """
+    answered = np.isfinite(depth.z_mm)
+    total_px, weight = total_disparity_px(grid, depth.z_mm[answered]), depth.confidence[answered]
+    order = np.argsort(total_px)
+    total_px, weight = total_px[order], weight[order].astype(np.float64)
+    least, modes = LEAST_MODE * weight.sum(), list[float]()
+    while len(modes) < MOST_MODES and weight.any():
+        mass = np.concatenate([[0.0], np.cumsum(weight)])
+        ends = np.searchsorted(total_px, total_px + 2 * MODE_PX, side="right")
+        first = int(np.argmax(mass[ends] - mass[:-1]))
+        window = slice(first, int(ends[first]))
+        if (share := weight[window].sum()) < least:
+            break
+        modes.append(float(weight[window] @ total_px[window] / share))
+        weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
+    return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())
 
 
 def depth_posterior(

@@ -150,23 +150,13 @@ class PosteriorDepth:
         )
         is_detected = is_inside & self._detected(is_possible, shown & is_inside)
         posterior = replace(posterior, is_detected=is_detected, is_supported=supported)
-        if isinstance(data, PhotonCounts):
-            posterior = self._explained(data, posterior, total_px, z_mm)
+        if isinstance(data, PhotonCounts) and self.sheets.sweeps > 0:
+            sheets = cut_sheets(posterior, total_px, total_disparity_px(data.grid, z_mm), self.sheets)
+            if sheets.probability.any():
+                from pcii.depth.explained_views import explain_posterior
+
+                posterior = explain_posterior(data, posterior, sheets, self.sheets)
         return replace(posterior, in_focus=posterior.in_focus[order])
-
-    def _explained(
-        self, counts: PhotonCounts, posterior: DepthPosterior, total_px: np.ndarray, z_mm: np.ndarray
-    ) -> DepthPosterior:
-        """The posterior, whose most probable depths are `total_px`, after sheets explain the photons of all
-        cameras."""
-        from pcii.depth.explained_views import explain, posterior_after
-
-        model = self.sheets
-        sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), model)
-        if model.sweeps == 0 or not sheets.probability.any():
-            return posterior
-        explained = explain(counts, sheets, posterior.block_px, model)
-        return posterior_after(posterior, sheets, explained, model.least)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.

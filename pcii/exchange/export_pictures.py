@@ -226,13 +226,3 @@ def write_png(path: Path, image: np.ndarray) -> None:
     import imagecodecs
 
     path.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(image)))
-
-
-def write_pfm(path: Path, values: np.ndarray) -> None:
-    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
-
-    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
-    """
-    height, width = values.shape
-    header = f"Pf\n{width} {height}\n-1\n".encode()
-    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

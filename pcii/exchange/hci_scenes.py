@@ -24,7 +24,7 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
-from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
+from pcii.exchange.export_pictures import pictures_of, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
 from pcii.exchange.stated_cameras import Note, Optics, warn
@@ -184,8 +184,8 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
         return baseline_mm * grid.focal_mm / (z_mm.astype(np.float64) * grid.pixel_mm) - shear_px
 
     for suffix, z_mm in _depth_maps_mm(dataset, names).items():
-        write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
-        write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
+        _write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
+        _write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
     (folder / PARAMETERS).write_text(_parameters(dataset, baseline_mm, shear_px, disparity_px))
     (folder / README).write_text(
         f"{visible(dataset.name)}: {grid.rows} x {grid.cols} integral images, row by row from the top left.\n"
@@ -281,3 +281,13 @@ def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]
         return math.nan, math.nan
     disparities = disparity_px(np.asarray(depths_mm))
     return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
+
+
+def _write_pfm(path: Path, values: np.ndarray) -> None:
+    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
+
+    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
+    """
+    height, width = values.shape
+    header = f"Pf\n{width} {height}\n-1\n".encode()
+    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

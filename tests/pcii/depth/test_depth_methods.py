@@ -7,8 +7,7 @@ from twins import unit_grid
 
 import pcii
 from pcii.depth import depth_methods, estimate_depth
-from pcii.depth.depth_planes import modes_mm
-from pcii.depth.methods import GROUP
+from pcii.depth.methods import GROUP, modes_mm
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 RANGE_MM = (1 / 5.9, 1 / 3.1)
