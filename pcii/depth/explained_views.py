@@ -79,9 +79,9 @@ class ExplainedViews:
         self.photons = _met(sheets, *_photon_rays(counts, block_px, model.most_photons))
         film, self.views = _film_rays(counts, block_px, model.cameras)
         self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
-        of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
+        photons_per_colour = np.bincount(self.photons.colour, minlength=self.samples.size)
         film_samples = self.samples * self.views.sum()
-        self.mean = np.maximum(of_colours / film_samples, TINY).astype(np.float32)
+        self.mean = np.maximum(photons_per_colour / film_samples, TINY).astype(np.float32)
         self.state = self._state(self.prior)
 
     def objective(self) -> float:
@@ -145,10 +145,10 @@ class ExplainedViews:
         film_reach *= self.views[:, None]
         reached, exposure = self._of_colours(photons, photon_reach, Q), self._of_blocks(film, film_reach)
         T, photon_share = self._textures(masks, reached, exposure)
-        of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
+        sheet_state = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons, photon_reach, of_sheets, gain))
-        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, of_sheets, loss))
+        likelihood = sum(explain_photons(*photons, photon_reach, sheet_state, gain))
+        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, sheet_state, loss))
         slope = self._of_blocks(photons, gain) - self._of_blocks(film, loss)
         return State(masks, likelihood - expected, slope)
 

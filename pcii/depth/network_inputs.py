@@ -99,8 +99,8 @@ def inputs_of(
 
     photons = float(evidence.photons.mean(dtype=np.float64)) / 4
     light = np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32)
-    own, brightness, coverage, surface = map(np.stack, zip(*each_in_threads(of_plane, planes), strict=True))
-    return NetworkInputs(own, brightness, coverage, surface, light, hint)
+    nats, rates, coverage, surface = map(np.stack, zip(*each_in_threads(of_plane, planes), strict=True))
+    return NetworkInputs(nats, rates, coverage, surface, light, hint)
 
 
 def _asinh(values: np.ndarray) -> np.ndarray:

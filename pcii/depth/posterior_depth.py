@@ -142,11 +142,11 @@ class PosteriorDepth:
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
             is_possible &= posterior.no_surface <= self.max_empty
         on_film_px = on_pixels(total_px, block_px, data.grid.shape_HW)
-        side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
+        side_px, answered = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
         depth = _nearest(coarse.planes, on_film_px[::side_px, ::side_px])
         shown, supported = (
             on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
-            for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
+            for part in self.shown(data, coarse.planes, answered, coarse.nats, depth, side_px, self.model)
         )
         is_detected = is_inside & self._detected(is_possible, shown & is_inside)
         posterior = replace(posterior, is_detected=is_detected, is_supported=supported)

@@ -119,9 +119,9 @@ def evidence_of_texture(
         total = np.empty((0, 0), np.float32)
         for octave in reversed(range(chosen.octaves)):
             # The first two octaves have the same grid.
-            own, step = octaves[plane][octave], 2 if octave > 0 else 1
-            add_saturated(own, largest[octave], chosen.saturation_nats, total, step)
-            total = own
+            evidence, step = octaves[plane][octave], 2 if octave > 0 else 1
+            add_saturated(evidence, largest[octave], chosen.saturation_nats, total, step)
+            total = evidence
         nats[plane] = total[:h, :w]
 
     each_in_threads(sum_octaves, range(len(planes)))
@@ -174,8 +174,8 @@ def _of_section(
         finer = blocks[0], *number
         blocks = [gaussian_mean(part, gaussian_weights(_blur(octave), 4)) for part in blocks]
         number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
-        of_model = _noise_weight(octave), model.averaging_error, model.contrast
-        constants = np.array([*of_model, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
+        coefficients = _noise_weight(octave), model.averaging_error, model.contrast
+        constants = np.array([*coefficients, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
         excess.append(octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))
     return excess
 
@@ -201,11 +201,11 @@ def _noise_weight(octave: int) -> float:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    own = np.eye(64 << octave)
+    finer_mean = np.eye(64 << octave)
     for finer in range(octave):
-        own = gaussian_filter1d(own, _blur(finer), axis=0, mode="constant")
+        finer_mean = gaussian_filter1d(finer_mean, _blur(finer), axis=0, mode="constant")
         if finer > 0:
-            own = (own[::2] + own[1::2]) / 2
-    around = gaussian_filter1d(own, _blur(octave), axis=0, mode="constant")
-    a, b = own[own.shape[0] // 2], around[own.shape[0] // 2]
+            finer_mean = (finer_mean[::2] + finer_mean[1::2]) / 2
+    coarser_mean = gaussian_filter1d(finer_mean, _blur(octave), axis=0, mode="constant")
+    a, b = finer_mean[finer_mean.shape[0] // 2], coarser_mean[finer_mean.shape[0] // 2]
     return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)

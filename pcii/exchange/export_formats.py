@@ -141,12 +141,12 @@ def write_shards(
 
     Datasets that follow each other are alike, so they are in an order drawn at random, the same each time.
     """
-    of_split = dict[str, list[Path]]()
+    shards_by_split = dict[str, list[Path]]()
     order = np.random.default_rng(0).permutation(len(collection))
     for done, number in enumerate(order.tolist(), start=1):
         row = collection.rows[number]
         split = row["split"] or "all"
-        shards = of_split.setdefault(split, [])
+        shards = shards_by_split.setdefault(split, [])
         if not shards or shards[-1].stat().st_size >= SHARD_BYTES:
             shards.append(folder / f"{split}-{len(shards):06d}.tar")
         described = {name: row[name] for name in (*COLUMNS, "values")}

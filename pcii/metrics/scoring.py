@@ -83,10 +83,10 @@ def score(
         for each in methods:
             if each.sections is sections:
                 rows += _plane_rows(each, pooled, true)
-    of_objects: list[dict[str, Any]] = []
+    object_rows: list[dict[str, Any]] = []
     if truth is not None:
-        of_objects = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    bounds = {"objects": of_objects}
+        object_rows = object_bounds(truth, full_light, methods[0].sections if methods else None)
+    bounds = {"objects": object_rows}
     readout = asdict(methods[0].sections.readout) if methods else None
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 

@@ -55,7 +55,7 @@ class TrueFocus:
 
     def names_at(self, plane: int) -> list[str]:
         """Names of the objects that belong to a plane."""
-        return [self.truth.names[number] for number, own in self.plane_of.items() if own == plane]
+        return [self.truth.names[number] for number, nearest in self.plane_of.items() if nearest == plane]
 
     @cached_property
     def by_object(self) -> np.ndarray:
@@ -152,16 +152,16 @@ def photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> di
         claimed = _by_photon(focus.photon_in_focus[plane], photons)[inside]
     object_id = photons.object_id[inside]
     blur_px = blur_half_extent_px(true.planes.grid, photons.z_mm[inside], focus.z_mm[plane])
-    own_objects = [number for number, own in true.plane_of.items() if own == plane]
-    right = {"object": np.isin(object_id, own_objects), "pixel": blur_px <= FOCUS_TOLERANCE_PX}
+    objects_at = [number for number, nearest in true.plane_of.items() if nearest == plane]
+    right = {"object": np.isin(object_id, objects_at), "pixel": blur_px <= FOCUS_TOLERANCE_PX}
     rows: dict[Kind, Row] = {}
     for kind in KINDS:
         counted = ~true.is_free(kind, object_id, blur_px)
-        kept, own = claimed & counted, right[kind] & counted
-        both = int(np.count_nonzero(kept & own))
+        kept, to_keep = claimed & counted, right[kind] & counted
+        both = int(np.count_nonzero(kept & to_keep))
         rows[kind] = {
             "photon_precision": both / int(kept.sum()) if kept.any() else None,
-            "photon_recall": both / int(own.sum()) if own.any() else None,
+            "photon_recall": both / int(to_keep.sum()) if to_keep.any() else None,
         }
     return rows
 

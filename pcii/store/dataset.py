@@ -127,9 +127,9 @@ class Dataset(ShortForm):
 
         The scope is its own, whatever that of `light`. Raises `InputError` for a light that is not there.
         """
-        for own in self.lights:
-            if str(own) == str(light):
-                return replace(self, choice=None if own in self._counted[-1:] else own)
+        for stored in self.lights:
+            if str(stored) == str(light):
+                return replace(self, choice=None if stored in self._counted[-1:] else stored)
         known = ", ".join(map(str, self.lights)) or "none"
         raise InputError(f"{self.path}: has no budget {light}; there are {known}")
 

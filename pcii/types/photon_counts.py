@@ -65,8 +65,8 @@ class PhotonCounts(Drawn):
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         readout = Readout(frames, bits)
         readout.check(counts)
-        own = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
-        return cls(grid, cfa, _dense=read_only(own), readout=readout)
+        copy = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
+        return cls(grid, cfa, _dense=read_only(copy), readout=readout)
 
     @classmethod
     def from_events(
@@ -180,8 +180,8 @@ class PhotonCounts(Drawn):
         events = self.events
         image = np.zeros(self.grid.shape_HW, dtype=np.int64)
         number = k * self.grid.cols + l
-        of_view = slice(self.view_starts[number], self.view_starts[number + 1])
-        image[events.i[of_view], events.j[of_view]] = events.n[of_view]
+        view_events = slice(self.view_starts[number], self.view_starts[number + 1])
+        image[events.i[view_events], events.j[view_events]] = events.n[view_events]
         return image
 
     def rate(self, k: int, l: int, frames: tuple[int, int] | None = None) -> np.ndarray:
