@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pcii.base.errors import InputError
-from pcii.depth.depth_planes import check_range_mm
+from pcii.depth.methods import check_range_mm
 from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for
 from pcii.evaluation.rows import Key, identity_of
 from pcii.store.dataset import Dataset

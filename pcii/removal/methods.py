@@ -16,7 +16,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.depth_planes import check_range_mm
+from pcii.depth.methods import check_range_mm
 from pcii.removal.posterior_masks import remove_by_network
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation

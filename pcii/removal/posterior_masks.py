@@ -8,7 +8,7 @@ probable one. Nothing is claimed where the depth map has no answer.
 import numpy as np
 
 from pcii.base.blocks import on_pixels
-from pcii.depth.depth_planes import check_search
+from pcii.depth.methods import check_search
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.types.estimates import DepthPosterior, Segmented
 from pcii.types.photon_counts import PhotonCounts
