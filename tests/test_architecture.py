@@ -16,7 +16,6 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
-        "imaging",
         "figures",
         "types",
         "store",
@@ -26,7 +25,6 @@ ROOMS = {
         "depth",
         "removal.three_step",
         "removal",
-        "baselines",
         "metrics",
         "evaluation",
         "app",
@@ -48,10 +46,10 @@ ROOMS = {
         "app",
     ],
 }
-# What simgen may share with pcii: store of files, image tools, types, masks, file formats and how commands
+# What simgen may share with pcii: store of files, types, masks, file formats and how commands
 # behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
 # mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "store", "imaging", "figures", "types", "exchange"}
+SHARED_ROOMS = {"base", "store", "figures", "types", "exchange"}
 NOT_SHARED = {
     "pcii.types.estimates",
     "pcii.types.focal_planes",

@@ -14,9 +14,9 @@ from pcii.base.command_line import results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS
 from pcii.base.progress import Stages
 from pcii.evaluation import comparison
-from pcii.exchange.export_command import export
+from pcii.exchange.export_formats import export
 from pcii.store.dataset import copy_sample
-from pcii.store.verification import verify_and_tell
+from pcii.store.verification import print_verification
 
 app = command_line.command_app(
     "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."
@@ -106,7 +106,7 @@ def verify(folder: Path, *, json: Annotated[bool, Parameter(name="--json")] = Fa
     json
         Print the number of files, or what is wrong, as JSON.
     """
-    verify_and_tell(folder, as_json=json)
+    print_verification(folder, as_json=json)
 
 
 def main() -> int:

@@ -23,7 +23,7 @@ from pcii.exchange.import_requests import (
     WholePair,
     read,
 )
-from pcii.exchange.stated_cameras import Tell, ViewOrder
+from pcii.exchange.stated_cameras import Note, ViewOrder
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.folders import check_free
@@ -122,7 +122,7 @@ def import_dataset(
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
-        imported = read(source, options, report=report, tell=notes.append)
+        imported = read(source, options, report=report, note=notes.append)
         images: list[Views | PhotonCounts] = [imported.images]
         origin = imported.origin
         if photons is not None:
@@ -166,7 +166,7 @@ def import_dataset(
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _without_hot_pixels(images: Views | PhotonCounts, note: Tell) -> Views | PhotonCounts:
+def _without_hot_pixels(images: Views | PhotonCounts, note: Note) -> Views | PhotonCounts:
     """Counts to judge the cameras by: hot pixels, which stand still in all views, would be sharp at infinity.
 
     Says how many there are. Warns of frames that are saturated.

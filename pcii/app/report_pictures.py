@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.app.pipeline import Outcome
+from pcii.base.blocks import box_around
 from pcii.base.compiled_loops import each_in_threads
 from pcii.figures.panels import colour_bar_uri
 from pcii.figures.pictures import (
@@ -26,7 +27,6 @@ from pcii.figures.pictures import (
     photon_picture,
     smoothing_for,
 )
-from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.bayer import colours_and_samples

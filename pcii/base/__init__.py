@@ -1,4 +1,4 @@
-"""Tools that know nothing of cameras: errors, progress, commands, compiled loops, sRGB."""
+"""Tools that know nothing of cameras: errors, progress, commands, compiled loops, sRGB, blocks of pixels."""
 
 import lazy_loader
 

@@ -1,4 +1,6 @@
 from . import command_line as command_line
+from .blocks import block_sums as block_sums, box_around as box_around, evenly_chosen as evenly_chosen
+from .blocks import on_pixels as on_pixels, sum_of as sum_of, window_sums as window_sums
 from .command_line import answer_json as answer_json, complain_of as complain_of
 from .command_line import results_folder as results_folder, say as say, say_next as say_next
 from .command_line import say_next_page as say_next_page

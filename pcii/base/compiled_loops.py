@@ -68,7 +68,7 @@ def shared(
 ) -> Callable[[Callable[..., Result]], Callable[..., list[Result]]]:
     """Decorator of a loop `loop(first, last, *arguments)`: compiled, called as `loop(*arguments)`.
 
-    Threads share the indices from 0 to `count(*arguments)` - 1, as `in_threads` tells.
+    Threads share the indices from 0 to `count(*arguments)` - 1 (see `in_threads`).
     """
 
     def decorate(loop: Callable[..., Result]) -> Callable[..., list[Result]]:

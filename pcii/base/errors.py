@@ -4,7 +4,7 @@
 class InputError(ValueError):
     """Invalid input, described in one sentence that names the argument, field or file and what is expected.
 
-    Where a file has several faults the sentence is of the first, and notes (`add_note`) tell the others. The
+    Where a file has several faults the sentence is of the first, and notes (`add_note`) name the others. The
     commands print both and exit with code 2.
     """
 

@@ -195,8 +195,8 @@ def _run_on_cluster(work: Work, pieces: Sequence[int], address: str) -> Generato
                 yield by_future.pop(future), future.result()
         except Exception as fault:
             # Dask raises various exceptions when its scheduler ends, some before its client knows of it.
-            of_dask = CancelledError, CommClosedError, KilledWorker
-            if client.status != "running" or isinstance(fault, of_dask):
+            dask_faults = CancelledError, CommClosedError, KilledWorker
+            if client.status != "running" or isinstance(fault, dask_faults):
                 lost = f"{address}: the Dask scheduler has ended or is out of reach, or its workers died"
                 raise WorkerLostError(f"{lost}; {GOES_ON}") from fault
             raise

@@ -14,22 +14,25 @@ as the network has them, and move towards what it and the photons say together, 
 (docs/theory.md, "What hides what").
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.base.compiled_loops import each_in_threads
 from pcii.depth.sheet_kernels import (
     add_up,
     expect_photons,
     explain_photons,
+    grow_planes,
     meet_sheets,
     reach_sheets,
 )
 from pcii.depth.sheet_textures import smooth_texture, textures
 from pcii.depth.sheets import SheetModel, Sheets
 from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
-from pcii.imaging.blocks import block_sums
+from pcii.types.estimates import DepthPosterior
 from pcii.types.geometry import parallax_per_total
 from pcii.types.photon_counts import PhotonCounts
 
@@ -76,9 +79,9 @@ class ExplainedViews:
         self.photons = _met(sheets, *_photon_rays(counts, block_px, model.most_photons))
         film, self.views = _film_rays(counts, block_px, model.cameras)
         self.film = _met(sheets, film, np.zeros(film[0].size, np.int8))
-        of_colours = np.bincount(self.photons.colour, minlength=self.samples.size)
+        photons_per_colour = np.bincount(self.photons.colour, minlength=self.samples.size)
         film_samples = self.samples * self.views.sum()
-        self.mean = np.maximum(of_colours / film_samples, TINY).astype(np.float32)
+        self.mean = np.maximum(photons_per_colour / film_samples, TINY).astype(np.float32)
         self.state = self._state(self.prior)
 
     def objective(self) -> float:
@@ -142,10 +145,10 @@ class ExplainedViews:
         film_reach *= self.views[:, None]
         reached, exposure = self._of_colours(photons, photon_reach, Q), self._of_blocks(film, film_reach)
         T, photon_share = self._textures(masks, reached, exposure)
-        of_sheets = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
+        sheet_state = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons, photon_reach, of_sheets, gain))
-        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, of_sheets, loss))
+        likelihood = sum(explain_photons(*photons, photon_reach, sheet_state, gain))
+        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, sheet_state, loss))
         slope = self._of_blocks(photons, gain) - self._of_blocks(film, loss)
         return State(masks, likelihood - expected, slope)
 
@@ -169,13 +172,16 @@ class ExplainedViews:
         return T, photon_share
 
 
-def explain(counts: PhotonCounts, sheets: Sheets, block_px: int, model: SheetModel) -> Explanation:
-    """What the photons say of sheets, after as many sweeps as raise the objective."""
-    views = ExplainedViews(counts, sheets, block_px, model)
+def explain_posterior(
+    counts: PhotonCounts, posterior: DepthPosterior, sheets: Sheets, model: SheetModel
+) -> DepthPosterior:
+    """The posterior after its sheets explain the photons, by as many sweeps as raise the objective."""
+    views = ExplainedViews(counts, sheets, posterior.block_px, model)
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    return Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
+    explanation = Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
+    return posterior_after(posterior, sheets, explanation, model.least)
 
 
 def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
@@ -247,3 +253,53 @@ def _rays(
     at = pixels[0] - rows * grid.shear_px[1], pixels[1] - cols * grid.shear_px[0]
     moves = rows * down, cols * across
     return tuple((part / block_px).astype(np.float32) for part in (*at, *moves))
+
+
+def posterior_after(
+    posterior: DepthPosterior, sheets: Sheets, explained: Explanation, least: float
+) -> DepthPosterior:
+    """The posterior whose planes near a sheet grow by the root of how much more it is seen.
+
+    So do no surface and planes far from all sheets with the light without depth. Where the photons
+    around do not tell the depth the network's stays. The probability of being in focus at a requested plane
+    grows by as much as the sheets at the plane do, that of no plane by as much as the others and the light
+    without depth. Where nothing changes the posterior does not either.
+    """
+    before, after = (_with_nothing(visible) for visible in (explained.before, explained.after))
+    growth = _by_depth(sheets, after, least) / _by_depth(sheets, before, least)
+    in_focus = _in_focus_after(posterior.in_focus, sheets, before, growth)
+    probability, no_surface = posterior.probability.copy(), posterior.no_surface.copy()
+    planes_px = posterior.planes.total_disparity_px
+    # The network's planes know the same photons already, so that what sheets say of them counts half.
+    grow_planes(probability, no_surface, planes_px, sheets.total_px, sheets.same_px, np.sqrt(growth))
+    is_supported = posterior.is_supported
+    probability = np.where(is_supported, probability, posterior.probability)
+    no_surface = np.where(is_supported, no_surface, posterior.no_surface)
+    return replace(posterior, probability=probability, no_surface=no_surface, in_focus=in_focus)
+
+
+def _with_nothing(visible: np.ndarray) -> np.ndarray:
+    """The probabilities (L + 1, h, w) of sheets (L, h, w), and of the light without depth."""
+    return np.concatenate([visible, 1 - visible.sum(axis=0, keepdims=True)])
+
+
+def _by_depth(sheets: Sheets, visible: np.ndarray, least: float) -> np.ndarray:
+    """The probability (L + 1, h, w) that a sheet, or another at its depth, is what is seen, more by `least`;
+    and of the light without depth."""
+    depths, same_px = sheets.total_px, sheets.same_px
+    near = [(visible[:-1] * (np.abs(depths - depth) < same_px)).sum(axis=0) for depth in depths]
+    return np.stack([*near, visible[-1]]) + np.float32(least)
+
+
+def _in_focus_after(
+    in_focus: np.ndarray, sheets: Sheets, before: np.ndarray, growth: np.ndarray
+) -> np.ndarray:
+    """Probabilities (R, h, w) of being in focus, each times the mean `growth` of its sheets, normalised."""
+    weight = before + np.finfo(np.float32).eps
+    # The sheets of each requested plane, then those of no plane and the light without depth.
+    members = [np.append(is_at_plane, False) for is_at_plane in sheets.is_at]
+    members.append(np.append(~sheets.is_at.any(axis=0), True))
+    claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
+    for probability, member in zip(claimed, members, strict=True):
+        probability *= (weight[member] * growth[member]).sum(axis=0) / weight[member].sum(axis=0)
+    return claimed[:-1] / claimed.sum(axis=0)

@@ -9,17 +9,19 @@ Another package registers one as an entry point of the group `pcii.depth_methods
 of their height and width, with depths above 0 or NaN, and confidence from 0 to 1.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.depth_planes import check_range_mm, check_search, modes_mm
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
 from pcii.sections.photon_statistics import warn_of_saturation
+from pcii.types.arrays import check_z_mm
+from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
 from pcii.types.focal_planes import FocalPlanes, check_data
+from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
@@ -28,18 +30,25 @@ Method = Callable[..., DepthMap]
 
 FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
-    "sweep-17": "pcii.baselines.textbook_depth:likelihood_sweep",
-    "variance-sweep": "pcii.baselines.textbook_depth:variance_sweep",
+    "sweep-17": "pcii.depth.textbook_depth:likelihood_sweep",
+    "variance-sweep": "pcii.depth.textbook_depth:variance_sweep",
 }
 FOR_VIEWS: dict[str, Method | str] = {
     "posterior": FOR_COUNTS["posterior"],
     "variance-sweep": FOR_COUNTS["variance-sweep"],
-    "structure-tensor": "pcii.baselines.textbook_depth:structure_tensor",
+    "structure-tensor": "pcii.depth.textbook_depth:structure_tensor",
 }
 """The built-in methods by what they take; those to compare with are loaded when they are asked for."""
 DEFAULT_METHOD = "posterior"
 """Of photon counts and of radiance."""
 BUILT_IN = FOR_COUNTS | FOR_VIEWS
+MOST_SPAN_PX = 2000.0
+"""Largest change of total disparity between the ends of a range that is searched."""
+SMALL_FILM_PX = 256
+"""Parallax in px from camera to camera up to which depths are searched on films of any size."""
+MODE_PX, LEAST_MODE, MOST_MODES = 2.0, 0.08, 4
+"""What is nearer in total disparity is in focus together: a blur half-extent of a pixel. The least share of a
+depth map that makes a plane worth looking at, and the number of planes that a report has room for."""
 
 
 def estimate_depth(
@@ -95,6 +104,29 @@ def find_surfaces(
     return modes_mm(depth_map, data.grid), sure
 
 
+def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
+    """Depths in mm at which a depth map has most surfaces, from near to far; empty without an answer.
+
+    Around each is the largest share of the confidence that lies within `MODE_PX` of total disparity and
+    farther than twice that from the others, down to `LEAST_MODE`. At most `MOST_MODES`.
+    """
+    answered = np.isfinite(depth.z_mm)
+    total_px, weight = total_disparity_px(grid, depth.z_mm[answered]), depth.confidence[answered]
+    order = np.argsort(total_px)
+    total_px, weight = total_px[order], weight[order].astype(np.float64)
+    least, modes = LEAST_MODE * weight.sum(), list[float]()
+    while len(modes) < MOST_MODES and weight.any():
+        mass = np.concatenate([[0.0], np.cumsum(weight)])
+        ends = np.searchsorted(total_px, total_px + 2 * MODE_PX, side="right")
+        first = int(np.argmax(mass[ends] - mass[:-1]))
+        window = slice(first, int(ends[first]))
+        if (share := weight[window].sum()) < least:
+            break
+        modes.append(float(weight[window] @ total_px[window] / share))
+        weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
+    return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())
+
+
 def depth_posterior(
     data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, z_mm: object = None
 ) -> DepthPosterior:
@@ -112,6 +144,35 @@ def depth_posterior(
     requested = NO_DEPTHS if z_mm is None else FocalPlanes.at_depths(data.grid, z_mm).z_mm
     check_search(data.grid, "z_mm", np.append(requested, z_range_mm))
     return PosteriorDepth().posterior(data, z_range_mm, requested)
+
+
+def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
+    """Near and far end of a range of depths; raises `InputError` if it cannot be searched."""
+    if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
+        raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
+    near, far = check_z_mm(z_range_mm).tolist()
+    if near >= far:
+        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    check_search(grid, "z_range_mm", np.array([near, far]))
+    return near, far
+
+
+def check_search(grid: CameraGrid, name: str, z_mm: np.ndarray) -> None:
+    """Raise `InputError`, which begins with `name`, unless all depths between the depths `z_mm` (Z,) can be
+    searched: they are not too many, and two cameras see the same at the farthest."""
+    near, far = z_mm.min(), z_mm.max()
+    span = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
+    if span > MOST_SPAN_PX:
+        raise InputError(
+            f"{name}: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
+            f"most {MOST_SPAN_PX:g} px can be searched; choose a farther near end"
+        )
+    # From camera to camera a point moves by its disparity: by a film or more, it is on one film alone. Small
+    # films are searched all the same, which takes no time.
+    sizes = np.maximum([grid.width, grid.height], SMALL_FILM_PX).tolist()
+    axes = zip(disparity_px(grid, far), sizes, (grid.cols, grid.rows), strict=True)
+    if grid.view_count > 1 and not any(n > 1 and disparity < size for disparity, size, n in axes):
+        raise InputError(f"{name}: up to {far:g} mm no two cameras see the same; choose a farther end")
 
 
 def _checked_range_mm(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> tuple[float, float]:

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.evidence.texture_evidence import TextureEvidence
-from pcii.imaging.blocks import block_sums
 
-CELL_SIDE_BLOCKS = 2
+NETWORK_CELL_BLOCKS = 2
 """Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""
 MOST_RATE = 25.0
 """Of the mean of the film; brighter blocks are taken as so bright."""
@@ -70,7 +70,7 @@ def inputs_of(
 
     def in_cells(values: Any) -> np.ndarray:
         return np.stack(
-            each_in_threads(lambda z: block_sums(values[z], CELL_SIDE_BLOCKS, np.float32), planes)
+            each_in_threads(lambda z: block_sums(values[z], NETWORK_CELL_BLOCKS, np.float32), planes)
         )
 
     def part_of(values: np.ndarray, side: int = 1) -> np.ndarray:
@@ -79,11 +79,11 @@ def inputs_of(
         return np.pad(values, ends, mode="symmetric")[box]
 
     def in_whole_cells(values: np.ndarray) -> np.ndarray:
-        return np.pad(values, [(0, -size % CELL_SIDE_BLOCKS) for size in values.shape])
+        return np.pad(values, [(0, -size % NETWORK_CELL_BLOCKS) for size in values.shape])
 
     posterior = surface_posterior(in_cells(evidence.nats), prior).transpose(2, 0, 1)
     ratio = np.log(np.maximum(posterior * len(planes), np.float32(np.exp(LEAST_LOG_RATIO))))
-    share = in_cells(evidence.samples) / np.float32(samples_per_block * CELL_SIDE_BLOCKS**2)
+    share = in_cells(evidence.samples) / np.float32(samples_per_block * NETWORK_CELL_BLOCKS**2)
     total, number = float(evidence.sums.sum(dtype=np.float64)), float(evidence.samples.sum(dtype=np.float64))
     mean = np.float32(total / number if total > 0 and number > 0 else 1.0)
 
@@ -93,14 +93,14 @@ def inputs_of(
         return (
             _asinh(nats),
             np.sqrt(np.clip(rate, 0, MOST_RATE)),
-            part_of(share[z], CELL_SIDE_BLOCKS),
-            part_of(np.minimum(ratio[z], np.float32(MOST_LOG_RATIO)), CELL_SIDE_BLOCKS),
+            part_of(share[z], NETWORK_CELL_BLOCKS),
+            part_of(np.minimum(ratio[z], np.float32(MOST_LOG_RATIO)), NETWORK_CELL_BLOCKS),
         )
 
     photons = float(evidence.photons.mean(dtype=np.float64)) / 4
     light = np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32)
-    own, brightness, coverage, surface = map(np.stack, zip(*each_in_threads(of_plane, planes), strict=True))
-    return NetworkInputs(own, brightness, coverage, surface, light, hint)
+    nats, rates, coverage, surface = map(np.stack, zip(*each_in_threads(of_plane, planes), strict=True))
+    return NetworkInputs(nats, rates, coverage, surface, light, hint)
 
 
 def _asinh(values: np.ndarray) -> np.ndarray:

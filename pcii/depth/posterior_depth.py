@@ -11,15 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pcii.base.blocks import box_around, on_pixels, window_sums
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.sheets import SheetModel, cut_sheets
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.shown_depth import ShownDepth
-from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
-from pcii.imaging.blocks import on_pixels, window_sums
-from pcii.imaging.bright_regions import box_around
+from pcii.evidence.texture_evidence import (
+    PHOTON_CELL_BLOCKS,
+    TextureEvidence,
+    TextureModel,
+    evidence_of_texture,
+)
 from pcii.sections.dense_sections import in_memory
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, DepthPosterior
@@ -138,32 +142,21 @@ class PosteriorDepth:
         if isinstance(data, PhotonCounts):  # the network has not learned where radiance shows no surface
             is_possible &= posterior.no_surface <= self.max_empty
         on_film_px = on_pixels(total_px, block_px, data.grid.shape_HW)
-        side_px, own = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
+        side_px, answered = max(coarse_px, self.block_px), _within(coarse.planes, answered_px)
         depth = _nearest(coarse.planes, on_film_px[::side_px, ::side_px])
         shown, supported = (
             on_pixels(part, side_px, data.grid.shape_HW)[::block_px, ::block_px]
-            for part in self.shown(data, coarse.planes, own, coarse.nats, depth, side_px, self.model)
+            for part in self.shown(data, coarse.planes, answered, coarse.nats, depth, side_px, self.model)
         )
         is_detected = is_inside & self._detected(is_possible, shown & is_inside)
         posterior = replace(posterior, is_detected=is_detected, is_supported=supported)
-        if isinstance(data, PhotonCounts):
-            posterior = self._explained(data, posterior, total_px, z_mm)
+        if isinstance(data, PhotonCounts) and self.sheets.sweeps > 0:
+            sheets = cut_sheets(posterior, total_px, total_disparity_px(data.grid, z_mm), self.sheets)
+            if sheets.probability.any():
+                from pcii.depth.explained_views import explain_posterior
+
+                posterior = explain_posterior(data, posterior, sheets, self.sheets)
         return replace(posterior, in_focus=posterior.in_focus[order])
-
-    def _explained(
-        self, counts: PhotonCounts, posterior: DepthPosterior, total_px: np.ndarray, z_mm: np.ndarray
-    ) -> DepthPosterior:
-        """The posterior, whose most probable depths are `total_px`, after sheets explain the photons of all
-        cameras."""
-        from pcii.depth.explained_views import explain
-        from pcii.depth.posterior_of_sheets import posterior_after
-
-        model = self.sheets
-        sheets = cut_sheets(posterior, total_px, total_disparity_px(counts.grid, z_mm), model)
-        if model.sweeps == 0 or not sheets.probability.any():
-            return posterior
-        explained = explain(counts, sheets, posterior.block_px, model)
-        return posterior_after(posterior, sheets, explained, model.least)
 
     def _blocks_px(self, planes: FocalPlanes) -> tuple[int, int]:
         """Sides of the coarse and of the fine blocks in which the network sees the film.
@@ -250,8 +243,8 @@ class PosteriorDepth:
         enough = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
         if not enough.any():
             return None
-        margin = self.margin_blocks // CELL_BLOCKS
-        step = MULTIPLE // CELL_BLOCKS
+        margin = self.margin_blocks // PHOTON_CELL_BLOCKS
+        step = MULTIPLE // PHOTON_CELL_BLOCKS
         rows, cols = (
             slice(axis.start // step * MULTIPLE, -(-axis.stop // step) * MULTIPLE)
             for axis in box_around(enough, (margin, margin))
@@ -260,12 +253,12 @@ class PosteriorDepth:
 
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""
-        i, j = (np.arange(size) // CELL_BLOCKS for size in best.shape)
+        i, j = (np.arange(size) // PHOTON_CELL_BLOCKS for size in best.shape)
         return self._photons_around(photons, block_px)[best, i[:, None], j] >= self.least_photons
 
     def _photons_around(self, photons: np.ndarray, block_px: int) -> np.ndarray:
         """Photons (Z, h / 4, w / 4) in a Gaussian window of weight 1 at its centre."""
-        return window_sums(photons, self.window_px / (block_px * CELL_BLOCKS))
+        return window_sums(photons, self.window_px / (block_px * PHOTON_CELL_BLOCKS))
 
 
 def _ends_px(
@@ -319,7 +312,7 @@ def _in_four(evidence: TextureEvidence, shape_HW: tuple[int, int]) -> TextureEvi
     """The evidence of each block on four blocks of a quarter of its area, as many as cover the film."""
     h, w = shape_HW
     nats, sums, samples = (on_pixels(part, 2, (h, w)) / np.float32(4) for part in evidence[:3])
-    cells = -(-h // CELL_BLOCKS), -(-w // CELL_BLOCKS)
+    cells = -(-h // PHOTON_CELL_BLOCKS), -(-w // PHOTON_CELL_BLOCKS)
     return TextureEvidence(nats, sums, samples, on_pixels(evidence.photons, 2, cells) / np.float32(4))
 
 

@@ -95,7 +95,7 @@ def explain_photons(
     `state` is m (L, n), T (Q, L + 1, n), and the share (Q, L, n) of each photon in the texture at its own
     block, which is taken out of it. Fills `gain` (N, L), t log(T / q behind it).
     """
-    m, T, own = state
+    m, T, photon_share = state
     L = len(m)
     total = 0.0
     for ray in range(first, last):
@@ -106,7 +106,7 @@ def explain_photons(
             sheet = order[ray, nearer]
             block, t = blocks[ray, sheet], reach[ray, sheet]
             texture = T[q, sheet, block]
-            others = max(texture - t * own[q, sheet, block], texture * LEAST_LEFT)
+            others = max(texture - t * photon_share[q, sheet, block], texture * LEAST_LEFT)
             gain[ray, sheet] = t * np.log(others / behind)
             behind += m[sheet, block] * (others - behind)
         total += np.log(behind)
@@ -192,7 +192,7 @@ def mix_levels(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Means of textures (K, Q, h, w), and of shares (K, h, w), by how likely (K, h, w) each is: (Q, h, w)."""
     K, Q, h, w = rate.shape
-    texture, own = np.zeros((Q, h, w), np.float32), np.zeros((Q, h, w), np.float32)
+    texture, photon_share = np.zeros((Q, h, w), np.float32), np.zeros((Q, h, w), np.float32)
     weight = np.empty(K, np.float32)
     for i in range(h):
         for j in range(w):
@@ -205,8 +205,8 @@ def mix_levels(
             for k in range(K):
                 for q in range(Q):
                     texture[q, i, j] += weight[k] / total * rate[k, q, i, j]
-                    own[q, i, j] += weight[k] / total * share[k, i, j] / samples[q]
-    return texture, own
+                    photon_share[q, i, j] += weight[k] / total * share[k, i, j] / samples[q]
+    return texture, photon_share
 
 
 @helper

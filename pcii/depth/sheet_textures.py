@@ -7,10 +7,10 @@ photon predicted by the others (the likelihood of leave-one-out).
 
 import numpy as np
 
+from pcii.base.blocks import block_sums
 from pcii.depth.sheet_kernels import level_likelihoods, mix_levels
 from pcii.depth.sheets import SheetModel
 from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
-from pcii.imaging.blocks import block_sums
 
 
 def textures(
@@ -34,8 +34,8 @@ def textures(
     levels = _levels(weighted, mean, samples, model)
     for octave, level in enumerate(levels):
         rate[octave], share[octave] = level[:Q], level[Q] * weight
-        of_blocks = level_likelihoods(weighted, rate[octave], share[octave], samples)
-        nats[octave] = gaussian_mean(of_blocks, gaussian_weights(model.window_blocks, 3))
+        block_nats = level_likelihoods(weighted, rate[octave], share[octave], samples)
+        nats[octave] = gaussian_mean(block_nats, gaussian_weights(model.window_blocks, 3))
     nats *= np.float32(2 * np.pi * model.window_blocks**2)
     return mix_levels(nats, rate, share, samples)
 

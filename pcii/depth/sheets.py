@@ -101,7 +101,7 @@ def cut_sheets(
     same_px = model.same_blocks * block_px
     # A surface is more probable than none.
     depths = _smooth_parts(total_px, posterior.no_surface < 0.5, block_px, model)
-    middle_px = [float(np.median(depth[own])) for own, depth in depths]
+    middle_px = [float(np.median(depth[part])) for part, depth in depths]
     sheets = [depth for _, depth in depths]
     for plane_px in requested_px:
         if not any(abs(plane_px - px) < same_px for px in middle_px):
@@ -115,9 +115,9 @@ def cut_sheets(
     share_planes(probability, posterior.probability, planes_px, total, same_px)
     # An object in focus is a surface, also where the network does not know its depth.
     claimed = np.zeros(shape, np.float32)
-    for in_focus, own in zip(posterior.in_focus, is_at, strict=True):
-        of_plane = probability[own] + np.finfo(np.float32).eps
-        claimed[own] += in_focus * of_plane / of_plane.sum(axis=0)
+    for in_focus, members in zip(posterior.in_focus, is_at, strict=True):
+        share = probability[members] + np.finfo(np.float32).eps
+        claimed[members] += in_focus * share / share.sum(axis=0)
     np.maximum(probability, claimed, out=probability)
     probability /= np.maximum(probability.sum(axis=0), 1)
     return Sheets(total, same_px, probability, is_at, np.argsort(-total, axis=0))
@@ -129,16 +129,16 @@ def _smooth_parts(
     """Connected parts of smooth depth, the largest first: their blocks (h, w) bool and their depth, continued
     to all blocks. Parts that continue each other are one."""
     parts = list[tuple[np.ndarray, np.ndarray]]()
-    for own in _connected(total_px, is_surface, block_px, model):
-        depth = _continued(total_px, own, model.window_blocks)
-        for place, (others, other) in enumerate(parts):
-            apart_px = _mean_distance(other, total_px, own), _mean_distance(depth, total_px, others)
+    for part in _connected(total_px, is_surface, block_px, model):
+        depth = _continued(total_px, part, model.window_blocks)
+        for place, (known, known_depth) in enumerate(parts):
+            apart_px = _mean_distance(known_depth, total_px, part), _mean_distance(depth, total_px, known)
             if max(apart_px) < model.same_blocks * block_px:
-                together = own | others
+                together = part | known
                 parts[place] = together, _continued(total_px, together, model.window_blocks)
                 break
         else:
-            parts.append((own, depth))
+            parts.append((part, depth))
     return sorted(parts, key=lambda part: -int(part[0].sum()))[: model.most_sheets]
 
 

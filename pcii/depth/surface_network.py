@@ -6,13 +6,14 @@ network's weights are in `weights`, with a card that says what it has seen; `tra
 ONNX Runtime.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pcii.depth.network_inputs import CELL_SIDE_BLOCKS, NetworkInputs
+from pcii.depth.network_inputs import NETWORK_CELL_BLOCKS, NetworkInputs
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -34,7 +35,7 @@ REQUESTED_GAIN, REQUESTED_SIGMA = 2.0, 2.0
 standard deviation in planes. With a larger gain or a smaller deviation depth is better in little
 light, and worse where objects are at planes that nobody requested (docs/experiments/depth.md)."""
 MIN_NEAR = 1e-3
-"""Added to the probabilities of depths near a plane: of what the depth excludes, shapes may still tell."""
+"""Added to the probabilities of depths near a plane: shapes may still show what the depth excludes."""
 
 
 class NetworkOutputs(NamedTuple):
@@ -53,7 +54,6 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     first, 1.5 lies between the second and the third. `inputs.hint` holds the same request.
     """
     import onnxruntime
-    from scipy.special import expit, softmax
 
     from pcii.base.compiled_loops import each_in_threads, threads
 
@@ -64,48 +64,89 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     Z, h, w = inputs.evidence.shape
     # The network takes several films at once; here it is one.
     batch = {name: part[None] for name, part in inputs._asdict().items()}
-    *of_cells, cell_nothing = map(np.asarray, trunk.run(None, batch, options))
-    nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
+    *cells, cell_nothing = map(np.asarray, trunk.run(None, batch, options))
+    nothing = cell_nothing[0, 0].repeat(NETWORK_CELL_BLOCKS, axis=0).repeat(NETWORK_CELL_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     in_focus = np.empty((requested_planes.size, h, w), np.float32)
-    lower = np.clip(requested_planes.astype(int), 0, max(Z - 2, 0))
-    upper = np.minimum(lower + 1, Z - 1)
     weights = requested_weights(Z, requested_planes)
-    prior = weights[-1, :, None, None]
-    upper_share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
-    names = [argument.name for argument in head.get_inputs()]
-    rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
+    blocks = batch["evidence"], batch["brightness"]
+    rows = max(1, BAND_VALUES // (Z * w)) * NETWORK_CELL_BLOCKS
 
-    def run_head(top: int, options: onnxruntime.RunOptions | None = None) -> None:
-        end = min(top + rows, h)
-        # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
-        first, last = max(top - CELL_SIDE_BLOCKS, 0), min(end + CELL_SIDE_BLOCKS, h)
-        cells = np.s_[:, :, first // CELL_SIDE_BLOCKS : last // CELL_SIDE_BLOCKS]
-        blocks = np.s_[:, :, first:last]
-        parts = *(part[cells] for part in of_cells), batch["evidence"][blocks], batch["brightness"][blocks]
-        outputs = head.run(["logit", "mask"], dict(zip(names, parts, strict=True)), options)
-        logit, mask = (np.asarray(part)[0, :, top - first : end - first] for part in outputs)
-        largest = logit.max(axis=0)
-        logit = logit - largest
-        weight = np.exp(logit)
-        total = weight.sum(axis=0)
-        none[top:end] = expit(nothing[top:end] - largest - np.log(total))
-        some = 1 - none[top:end]
-        logit /= np.float32(TEMPERATURE)
-        tempered = np.exp(logit, out=logit)
-        tempered *= prior
-        np.multiply(tempered, some / tempered.sum(axis=0), out=probability[:, top:end])
-        *of_planes, of_all = np.tensordot(weights, weight, axes=1)
-        of_planes = np.reshape(of_planes, (-1, *some.shape)) * (some / of_all)
-        of_none = np.maximum(1 - of_planes.sum(axis=0, keepdims=True), 0)
-        at_planes = (1 - upper_share) * mask[lower] + upper_share * mask[upper]
-        logits = np.concatenate([at_planes + np.log(of_planes + MIN_NEAR), np.log(of_none + MIN_NEAR)])
-        in_focus[:, top:end] = softmax(logits, axis=0)[:-1]
+    def run_band(top: int, options: Any = None) -> None:
+        band = slice(top, min(top + rows, h))
+        logit, mask = _run_head(head, cells, blocks, band, options)
+        none[band], relative = _nothing_and_planes(logit, nothing[band])
+        some = 1 - none[band]
+        probability[:, band] = _tempered(logit, weights[-1], some)
+        in_focus[:, band] = _focus(relative, some, _at_requested(mask, requested_planes), weights)
 
     *others, last = range(0, h, rows)
-    each_in_threads(run_head, others)
-    run_head(last, options)
+    each_in_threads(run_band, others)
+    run_band(last, options)
     return NetworkOutputs(probability, none, in_focus)
+
+
+def _run_head(
+    head: "InferenceSession",
+    cells: Sequence[np.ndarray],
+    blocks: Sequence[np.ndarray],
+    band: slice,
+    options: Any,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The logits of planes and of masks at planes, (Z, rows, w), of a band of rows of blocks.
+
+    The head is given the trunk's `cells`, and the evidence and brightness of `blocks`.
+    """
+    # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
+    side = NETWORK_CELL_BLOCKS
+    first, last = max(band.start - side, 0), min(band.stop + side, blocks[0].shape[2])
+    parts = [part[:, :, first // side : last // side] for part in cells]
+    parts += [part[:, :, first:last] for part in blocks]
+    names = [argument.name for argument in head.get_inputs()]
+    outputs = head.run(["logit", "mask"], dict(zip(names, parts, strict=True)), options)
+    logit, mask = (np.asarray(part)[0, :, band.start - first : band.stop - first] for part in outputs)
+    return logit, mask
+
+
+def _nothing_and_planes(logit: np.ndarray, nothing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The probability (rows, w) of no surface, and those of planes (Z, rows, w) relative to the largest."""
+    from scipy.special import expit
+
+    largest = logit.max(axis=0)
+    relative = np.exp(logit - largest)
+    return expit(nothing - largest - np.log(relative.sum(axis=0))), relative
+
+
+def _tempered(logit: np.ndarray, prior: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Probabilities (Z, rows, w) of planes, whose sum is `some` (rows, w), with a prior (Z,) of each."""
+    tempered = logit - logit.max(axis=0)
+    tempered /= np.float32(TEMPERATURE)
+    np.exp(tempered, out=tempered)
+    tempered *= prior[:, None, None]
+    return np.multiply(tempered, some / tempered.sum(axis=0), out=tempered)
+
+
+def _at_requested(mask: np.ndarray, requested_planes: np.ndarray) -> np.ndarray:
+    """Values (R, rows, w) of a mask (Z, rows, w) at requested planes, which may lie between two."""
+    Z = len(mask)
+    lower = np.clip(requested_planes.astype(int), 0, max(Z - 2, 0))
+    share = np.clip(requested_planes - lower, 0, 1).astype(np.float32)[:, None, None]
+    return (1 - share) * mask[lower] + share * mask[np.minimum(lower + 1, Z - 1)]
+
+
+def _focus(relative: np.ndarray, some: np.ndarray, mask: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Probabilities (R, rows, w) of being in focus at each requested plane, by depth and by `mask`.
+
+    `relative` (Z, rows, w) are the probabilities of planes, `some` (rows, w) that there is a surface, and
+    `weights` those of `requested_weights`.
+    """
+    from scipy.special import softmax
+
+    *near, total = np.tensordot(weights, relative, axes=1)
+    near = np.reshape(near, (-1, *some.shape)) * (some / total)
+    elsewhere = np.maximum(1 - near.sum(axis=0, keepdims=True), 0)
+    logits = np.concatenate([mask + np.log(near + MIN_NEAR), np.log(elsewhere + MIN_NEAR)])
+    return softmax(logits, axis=0)[:-1]
 
 
 def depth_prior(Z: int, requested_planes: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from pcii.evaluation.tables import TITLES, light_name, mean_table, rank_table
 from pcii.figures.pages import NOT_KNOWN, render_page, text_table
 from pcii.store.collection import IN_FRAMES
 from pcii.store.folders import ROWS
-from pcii.store.verification import verify_scores
+from pcii.store.verification import verify
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -105,7 +105,7 @@ def write_page(folder: Path, out: Path) -> int:
     """
     submissions: dict[Path, ScoredSubmission] = {}
     for file in sorted(folder.glob(f"*/{SUBMISSION}")):
-        verify_scores(file.parent, MAX_BYTES)
+        _verify_scores(file.parent)
         submissions[file.parent] = read_as(ScoredSubmission, file.parent)
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
@@ -148,6 +148,18 @@ def write_page(folder: Path, out: Path) -> int:
     }
     write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
+
+
+def _verify_scores(folder: Path) -> None:
+    """Verify scores by others; raises `InputError` as `verify`, for links, and for more than `MAX_BYTES`."""
+    sizes = {file: file.lstat().st_size for file in sorted(folder.iterdir())}
+    for file in (folder, *sizes):
+        if file.is_symlink() or not (file.is_file() or file == folder):
+            raise InputError(f"{file}: is a link or no file; a folder of scores holds nothing but files")
+    if sum(sizes.values()) > MAX_BYTES:
+        largest = max(sizes, key=sizes.__getitem__)
+        raise InputError(f"{largest}: has {sizes[largest]} bytes; all files may have {MAX_BYTES} together")
+    verify(folder)
 
 
 def _compare(comparison: Comparison, cell_means: "DataFrame") -> dict[str, Any]:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
 from pcii.base.progress import Report
-from pcii.depth.depth_planes import check_range_mm
-from pcii.depth.methods import estimate_depth
+from pcii.depth.methods import check_range_mm, estimate_depth
 from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for, software_of
 from pcii.evaluation.rows import Key, Row, RowFile, leaves
 from pcii.metrics.bounds import object_bounds

@@ -8,43 +8,53 @@ all signs: what is behind the cameras in one order is in front of them in the ot
 Notation: V views, (h, w) cells of pixels, P planes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
+from pcii.base.blocks import block_sums, evenly_chosen
 from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
-from pcii.imaging.blocks import block_sums, evenly_chosen
 from pcii.store.dataset_writer import check_depth_range
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.geometry import depth_of_total_disparity_mm, parallax_per_total, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
 
+# What limits the work. More is slower; fewer cells place depths less exactly.
 MAX_CAMERAS = 5
 """Largest number of camera rows, and of columns, that are used: first, last, and equally spread between."""
 COARSE_CELLS, FINE_CELLS = 128, 512
 """Largest side of the views in cells, to try orders and to place depths."""
-MIN_CELLS = 16
-"""Smallest side of views that are judged."""
+MAX_PEAKS = 4
+"""Largest number of depths: as many as a report has room for."""
+RANGE_FACTOR = 4.0
+"""How far beyond a stated range depths are looked at, as a factor of parallax: ranges are stated roughly."""
+
+# What follows from the cells: views move by whole ones, and a cell has to hold texture above its noise.
 PHOTONS_PER_CELL = 4.0
-"""Of counts; with fewer the noise hides the texture."""
+"""Least mean of counts: the root of a Poisson count has the standard deviation 1/2, here a quarter of it."""
 BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0
-"""Views are blurred, so that half cells do not matter, and lose what is smooth, such as vignetting."""
+"""Standard deviations of the band that views are limited to: half cells do not matter, nor vignetting."""
 WINDOW_CELLS, MIN_SHARE = 5, 0.6
 """Side of the window over which the variance is averaged; share of the views that have to reach a cell, and
-of the cells that have to be reached in a window."""
+of the cells that have to be reached in a window: more than half."""
+MIN_CELLS = 16
+"""Smallest side of views that are judged: three windows."""
+
+# What decides, set by hand so that right views are not warned about and wrong ones are, as
+# tests/pcii/evidence/test_camera_fit.py keeps it. If a share of the variance is larger, noise decides.
 BETTER = 0.75
 """An order is better than others if at most this share of their variance remains."""
 SHARP, MIN_SHARP = 0.5, 0.02
-"""At a surface the variance is at most this share of its mean over the planes; least share of such cells."""
-PEAK_SHARE, MAX_PEAKS = 0.08, 4
-"""Least share of what is sharp that a depth has, and the largest number of depths."""
-BEHIND_SHARE = 0.12
-"""Largest share of what seems sharp by chance behind the cameras."""
-RANGE_FACTOR = 4.0
-"""How far beyond a stated range depths are looked at, as a factor of parallax."""
+"""At a surface the variance is at most this share of its mean over the planes; least share of such cells. If
+the latter is smaller, noise is taken for surfaces; if larger, small things are not seen."""
+PEAK_SHARE = 0.08
+"""Least share of what is sharp that a depth has. If it is smaller, chance makes depths."""
+BEHIND_SHARE, STRAY_SHARE = 0.12, 0.02
+"""Largest share of what is sharp that may be behind the cameras by chance, without a warning and after a
+shift. If the latter is smaller, single cells make the shift larger."""
 
 
 @dataclass(frozen=True)
@@ -102,33 +112,56 @@ def check_grid(
     fit = replace(fit, order=None if best == order else best)
     mass = _by_plane(variance, sharpness * is_sharp)
     if mass[total_px < -side].sum() > BEHIND_SHARE:
-        is_behind = _still_px(grids[best]) - shifts_px < -side  # of views whose two axes are turned
-        if mass[is_behind].sum() <= BEHIND_SHARE and not is_behind[_peaks(mass)].any():
-            rows, cols = best.flip_rows ^ (grids[best].rows > 1), best.flip_cols ^ (grids[best].cols > 1)
-            return replace(fit, order=replace(best, flip_rows=rows, flip_cols=cols))
-        least_px = float(shifts_px[np.searchsorted(mass.cumsum(), 0.02)])
-        x, y = 2 * max(-least_px, 0.0) * parallax_per_total(grids[best])  # as far in front as it was behind
-        return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
+        return _in_front(fit, best, grids[best], mass, shifts_px, side)
     if fit.order is not None:
         return fit
+    peaks = _peaks(np.where(total_px > 0, mass, 0))
+    depths_mm = _placed_mm(images, tables[order], (variance, is_sharp), shifts_px, peaks, side)
+    return replace(fit, z_mm=tuple(sorted({*depths_mm})))
+
+
+def _in_front(
+    fit: CameraFit, order: ViewOrder, grid: CameraGrid, mass: np.ndarray, shifts_px: np.ndarray, side: int
+) -> CameraFit:
+    """The fit of views in which much is sharp behind the cameras: the order or the shear that mends it."""
+    is_behind = _still_px(grid) - shifts_px < -side  # of views whose two axes are turned
+    if mass[is_behind].sum() <= BEHIND_SHARE and not is_behind[_peaks(mass)].any():
+        rows, cols = order.flip_rows ^ (grid.rows > 1), order.flip_cols ^ (grid.cols > 1)
+        return replace(fit, order=replace(order, flip_rows=rows, flip_cols=cols))
+    least_px = float(shifts_px[np.searchsorted(mass.cumsum(), STRAY_SHARE)])
+    x, y = 2 * max(-least_px, 0.0) * parallax_per_total(grid)  # as far in front as it was behind
+    return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
+
+
+def _placed_mm(
+    images: Views | PhotonCounts,
+    table: np.ndarray,
+    coarse: tuple[np.ndarray, np.ndarray],
+    shifts_px: np.ndarray,
+    peaks: list[int],
+    side: int,
+) -> Iterator[float]:
+    """The depths of the surfaces around planes of which much is sharp, by finer cells and planes.
+
+    `coarse` are the variance (P, h, w) and whether cells are sharp (h, w), in cells of `side` px.
+    """
+    variance, is_sharp = coarse
     fine = min(_cell_side(images, FINE_CELLS), side)
-    fine_cells, depths = _cells_of(images, fine), set[float]()
-    for peak in _peaks(np.where(total_px > 0, mass, 0)):
+    fine_cells = _cells_of(images, fine)
+    for peak in peaks:
         near_px = shifts_px[peak] + np.arange(-2 * side, 2 * side + fine / 4, fine / 2)
-        close = _sweep(fine_cells, tables[order], grid, near_px, fine)
+        close = _sweep(fine_cells, table, images.grid, near_px, fine)
         is_surface = is_sharp & (np.abs(variance.argmin(axis=0) - peak) <= 1)
         rows, cols = (  # of the coarse cell in which each fine one is
             np.minimum(np.arange(count) * fine // side, most - 1)
             for count, most in zip(close.shape[1:], is_surface.shape, strict=True)
         )
         is_reached = is_surface[np.ix_(rows, cols)] & np.isfinite(close).all(axis=0)
-        if not is_reached.any():
-            continue
-        curve = close[:, is_reached].mean(axis=1)
-        weight = np.maximum(curve.mean() - curve, 0) ** 2 + 1e-30
-        place_px = weight @ near_px / weight.sum() + _still_px(grid)
-        depths.add(float(depth_of_total_disparity_mm(grid, place_px)))
-    return replace(fit, z_mm=tuple(sorted(depths)))
+        if is_reached.any():
+            curve = close[:, is_reached].mean(axis=1)
+            weight = np.maximum(curve.mean() - curve, 0) ** 2 + 1e-30
+            place_px = weight @ near_px / weight.sum() + _still_px(images.grid)
+            yield float(depth_of_total_disparity_mm(images.grid, place_px))
 
 
 def _tables_of_orders(grid: CameraGrid, order: ViewOrder) -> dict[ViewOrder, np.ndarray]:

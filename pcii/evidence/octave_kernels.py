@@ -57,8 +57,8 @@ def doubled(coarse: np.ndarray, h: int, w: int) -> np.ndarray:
     three, sixteenth = np.float32(3), np.float32(1 / 16)
     for c in range(C):
         for i in range(h):
-            beside = min(i // 2 + 1, rows - 1) if i % 2 else max(i // 2 - 1, 0)
-            line[:] = (three * coarse[c, i // 2] + coarse[c, beside]) * sixteenth
+            neighbour = min(i // 2 + 1, rows - 1) if i % 2 else max(i // 2 - 1, 0)
+            line[:] = (three * coarse[c, i // 2] + coarse[c, neighbour]) * sixteenth
             row = fine[c, i]
             for b in range((w + 1) // 2):
                 row[2 * b] = three * line[b] + line[max(b - 1, 0)]
@@ -121,8 +121,8 @@ def add_saturated(
             row += quarter * total[i]
         elif total.size:
             last = total.shape[0] - 1
-            beside = min(i // 2 + 1, last) if i % 2 else max(i // 2 - 1, 0)
-            line[:] = (three * total[i // 2] + total[beside]) * quarter
+            neighbour = min(i // 2 + 1, last) if i % 2 else max(i // 2 - 1, 0)
+            line[:] = (three * total[i // 2] + total[neighbour]) * quarter
             last = line.size - 1
             for b in range(line.size):
                 row[2 * b] += (three * line[b] + line[max(b - 1, 0)]) * quarter * quarter

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pcii.base.blocks import block_sums, on_pixels, window_sums
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.imaging.blocks import block_sums, on_pixels, window_sums
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import parallax_per_total
 from pcii.types.images import Views
@@ -53,7 +53,7 @@ class ShownDepth:
         self,
         data: PhotonCounts | Views,
         planes: FocalPlanes,
-        own: slice,
+        inside: slice,
         nats: np.ndarray,
         depth: np.ndarray,
         block_px: int,
@@ -61,24 +61,24 @@ class ShownDepth:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Where (h, w) bool the evidence (Z, h, w) shows a depth, and where it supports that of a block.
 
-        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`, of planes of the range, `own`,
-        and beyond. `depth` (h, w) are numbers of planes; those beyond the range are taken for its ends.
+        `nats` are `evidence_of_texture(data, planes, block_px, model).nats`, of the planes `inside` the range
+        and beyond it. `depth` (h, w) are numbers of planes; those beyond the range are taken for its ends.
         """
         from scipy.ndimage import maximum_filter
 
         all_px, step_px = planes.total_disparity_px, self.step_blocks * block_px
-        own_px = all_px[own]
+        inside_px = all_px[inside]
         # Less than a step behind infinity a surface with little disparity would be sharp still.
-        behind_px = -np.unique(np.maximum(own_px, step_px))
+        behind_px = -np.unique(np.maximum(inside_px, step_px))
         behind, outside = (
             _evidence_at(total_px, data, block_px, model)
             for total_px in (behind_px, _outside_px(all_px, step_px))
         )
-        outside, nats = np.concatenate([nats[: own.start], nats[own.stop :], outside]), nats[own]
+        outside, nats = np.concatenate([nats[: inside.start], nats[inside.stop :], outside]), nats[inside]
         (h, w), side = nats.shape[1:], 1
         shown, supported = np.zeros((h, w), bool), np.zeros((h, w), bool)
         squares = np.mean(behind**2, axis=0)
-        depth = np.clip(depth - own.start, 0, len(nats) - 1)
+        depth = np.clip(depth - inside.start, 0, len(nats) - 1)
         i, j = np.indices((h, w), sparse=True)
         for _ in range(self.windows):
             # Each window has the same standard deviation in cells, which grow with it.
@@ -95,15 +95,15 @@ class ShownDepth:
             blocks = sigma_cells * side
             least = np.clip(self.noise_sigmas * noise, self.least_gain * blocks, self.most_gain * blocks)
             sums = _in_windows(nats, sigma_cells)
-            best, other, beside = (
+            best, best_behind, best_outside = (
                 part.max(axis=0)
                 for part in (sums, _in_windows(behind, sigma_cells), _in_windows(outside, sigma_cells))
             )
-            is_shown = (best - maximum_filter(other, reach) > least) & (best >= beside)
+            is_shown = (best - maximum_filter(best_behind, reach) > least) & (best >= best_outside)
             shown |= on_pixels(is_shown, side, (h, w))
             near = maximum_filter(sums, (2 * self.support_planes + 1, 1, 1))
-            enough = other + np.minimum(self.support_sigmas * local_noise, least)
-            is_supported = (near > enough) & (near >= beside) & (near >= self.support_share * best)
+            enough = best_behind + np.minimum(self.support_sigmas * local_noise, least)
+            is_supported = (near > enough) & (near >= best_outside) & (near >= self.support_share * best)
             supported |= is_supported[depth, i // side, j // side]
         return shown, supported
 

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.imaging.blocks import block_sums, sum_of
+from pcii.base.blocks import block_sums, sum_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views, binary_scale
@@ -74,7 +74,7 @@ planes up to 2 px of total disparity apart have the same shifts. With 3/4 the er
 size and twice the frequency, the least for one number for all cameras. The section lies 1/4 px off, an eighth
 of a block.
 """
-CELL_BLOCKS = 4
+PHOTON_CELL_BLOCKS = 4
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
 """What is divided by where there are no samples, or no light."""
 
@@ -106,10 +106,11 @@ def evidence_of_texture(
         number = colours * _samples_of_blocks(single, 0, block_px), _samples_of_blocks(single, 1, block_px)
         sums[plane] = blocks[0][:h, :w]
         np.outer(number[0][:h], number[1][:w], out=samples[plane])
-        of_cells, spread = (block_sums(part, CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1]))
-        return _of_section(blocks, number, chosen, least_samples), of_cells**2 / np.maximum(
-            spread, LEAST_RATE
+        of_cells, spread = (
+            block_sums(part, PHOTON_CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1])
         )
+        photons = of_cells**2 / np.maximum(spread, LEAST_RATE)
+        return _of_section(blocks, number, chosen, least_samples), photons
 
     octaves, photons = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
     largest = [reduce(np.maximum, each).clip(min=0) for each in zip(*octaves, strict=True)]
@@ -118,9 +119,9 @@ def evidence_of_texture(
         total = np.empty((0, 0), np.float32)
         for octave in reversed(range(chosen.octaves)):
             # The first two octaves have the same grid.
-            own, step = octaves[plane][octave], 2 if octave > 0 else 1
-            add_saturated(own, largest[octave], chosen.saturation_nats, total, step)
-            total = own
+            evidence, step = octaves[plane][octave], 2 if octave > 0 else 1
+            add_saturated(evidence, largest[octave], chosen.saturation_nats, total, step)
+            total = evidence
         nats[plane] = total[:h, :w]
 
     each_in_threads(sum_octaves, range(len(planes)))
@@ -138,7 +139,7 @@ def _block_sums(
 
     def in_blocks(values: np.ndarray) -> np.ndarray:
         blocks = block_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
-        return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
+        return np.pad(blocks, [(0, -size % PHOTON_CELL_BLOCKS) for size in blocks.shape])
 
     section = reconstruct(data, plane, variance=isinstance(data, Views))
     if section.variance is None:  # it is that of a Poisson variable, its mean
@@ -154,7 +155,7 @@ def _samples_of_blocks(plane: FocalPlanes, axis: int, block_px: int) -> np.ndarr
     # The pixels of a shifted row before each edge.
     before = np.clip(edges - np.maximum(shift, 0)[:, None], 0, np.maximum(size - np.abs(shift), 0)[:, None])
     blocks = np.diff(before.sum(axis=0)).astype(np.float32)
-    return np.pad(blocks, (0, -blocks.size % CELL_BLOCKS))
+    return np.pad(blocks, (0, -blocks.size % PHOTON_CELL_BLOCKS))
 
 
 def _of_section(
@@ -173,8 +174,8 @@ def _of_section(
         finer = blocks[0], *number
         blocks = [gaussian_mean(part, gaussian_weights(_blur(octave), 4)) for part in blocks]
         number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
-        of_model = _noise_weight(octave), model.averaging_error, model.contrast
-        constants = np.array([*of_model, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
+        coefficients = _noise_weight(octave), model.averaging_error, model.contrast
+        constants = np.array([*coefficients, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
         excess.append(octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))
     return excess
 
@@ -200,11 +201,11 @@ def _noise_weight(octave: int) -> float:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    own = np.eye(64 << octave)
+    finer_mean = np.eye(64 << octave)
     for finer in range(octave):
-        own = gaussian_filter1d(own, _blur(finer), axis=0, mode="constant")
+        finer_mean = gaussian_filter1d(finer_mean, _blur(finer), axis=0, mode="constant")
         if finer > 0:
-            own = (own[::2] + own[1::2]) / 2
-    around = gaussian_filter1d(own, _blur(octave), axis=0, mode="constant")
-    a, b = own[own.shape[0] // 2], around[own.shape[0] // 2]
+            finer_mean = (finer_mean[::2] + finer_mean[1::2]) / 2
+    coarser_mean = gaussian_filter1d(finer_mean, _blur(octave), axis=0, mode="constant")
+    a, b = finer_mean[finer_mean.shape[0] // 2], coarser_mean[finer_mean.shape[0] // 2]
     return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)

@@ -1,12 +1,10 @@
-"""Arrays of light and of photon counts, and files of photon counts, whose frames are added up.
+"""Arrays of light, and photon counts of arrays and files, whose frames are added up.
 
-How frames are kept is a `FrameFormat`. Files may be larger than memory.
+How frames are kept is a `FrameFormat`, where they are `frame_stacks`.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +13,6 @@ from pcii.base.progress import Report, silent
 from pcii.exchange.array_files import open_array
 from pcii.exchange.frame_formats import (
     AS_COUNTED,
-    EXACT,
     SURE_NATS,
     FrameFormat,
     expected_above_one,
@@ -23,9 +20,10 @@ from pcii.exchange.frame_formats import (
     warn_of_dark_columns,
     warn_of_numbers,
 )
-from pcii.exchange.image_folders import files_by_camera, is_picture, pages_of, views_of
-from pcii.exchange.pixel_files import Encoding, decode, picture_of, to_radiance
-from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
+from pcii.exchange.frame_stacks import FrameFiles, FrameStack, ViewTable, stacks_of
+from pcii.exchange.image_folders import views_of
+from pcii.exchange.pixel_files import Encoding, to_radiance
+from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
 from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
@@ -35,11 +33,6 @@ PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
-MANY_VIEWS = 100
-"""An array of more views than this, and of more than each view has pixels, has its axes in another order:
-what was taken for cameras are pixels."""
-AXES = "KLNTHWC"
-"""The order in which axes are understood: cameras or views, frames, pixels, colours."""
 FRAMES_AT_ONCE = 255
 """Their sum fits in a byte."""
 
@@ -60,12 +53,12 @@ def import_arrays(
     With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C); or its `axes` are named, such as "HWKL", N
     being views. Files are .npy, .npz, .mat and HDF5, of which `key` names one of several arrays. Floats are
     linear, unless `encoding` says otherwise; whole numbers need it: they may be sRGB of pictures or linear
-    values of a sensor, which the file does not tell. `cfa` is a Bayer pattern, of which arrays of one channel
+    values of a sensor, which the file does not say. `cfa` is a Bayer pattern, of which arrays of one channel
     are mosaics. Raises `InputError` for what does not fit.
     """
     is_array = isinstance(source, np.ndarray)
     numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
-    views = order.arrange(_by_camera(numbers, name, grid, order, axes, "H, W[, C]"))
+    views = ViewTable(grid=grid, order=order, axes=axes).by_camera(numbers, name, "H, W[, C]")
     if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
         raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
     if views.ndim == 4:
@@ -101,7 +94,7 @@ def import_counts(
     frames: tuple[int, int] | None = None,
     stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
@@ -114,20 +107,13 @@ def import_counts(
     (K L, H, W) or (K L, N, H, W); or its `axes` are named, such as "HWKL" or "NTHW", N being views and T
     frames. Of frames in three channels each pixel keeps the colour of its filter in
     `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
-    of each single count of frames of one bit is kept, up to 2^24 counts. `tell` takes sentences on what is
+    of each single count of frames of one bit is kept, up to 2^24 counts. `note` takes sentences on what is
     left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
     """
     stored.check()
-    stacks = _stacks_of(source, pattern, grid, order, axes, key, stored, tell)
+    stacks = stacks_of(source, pattern, ViewTable(grid=grid, order=order, axes=axes), key, stored, note)
     name, first = stacks[0, 0].name, stacks[0, 0].load()
-    if first.ndim not in (3, 4) or 0 in first.shape or (stored.bitpack and first.dtype != np.uint8):
-        expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if stored.bitpack else "(T, H, W)"
-        raise InputError(f"{name}: expected frames {expected}, got {first.dtype} {first.shape}")
-    if first.ndim == 4 and (first.shape[3] != 3 or cfa is None):
-        raise InputError(
-            f"{name}: has {first.shape[3]} channels; photon counts have one, or three of which --cfa says "
-            "which one each pixel keeps"
-        )
+    _check_frames(name, first, stored, cfa)
     begin, stop = (0, len(first)) if frames is None else (frames[0], frames[1] + 1)
     if not 0 <= begin < stop <= len(first):
         raise InputError(
@@ -143,28 +129,51 @@ def import_counts(
     total = _Sum(camera_grid, stop - begin, 1 if is_binary else stored.bits)
     dead = stored.dead_pixels(camera_grid.shape_HW)
     for number, (camera, stack) in enumerate(np.ndenumerate(stacks)):
-        array = stack.load()
-        if (array.shape, array.dtype) != (first.shape, first.dtype):
-            shapes = [f"{one.dtype} {one.shape}" for one in (array, first)]
-            raise InputError(f"{stack.name}: has frames {shapes[0]}, where {name} has {shapes[1]}")
-        most = max(PIECE_BYTES // max(array[:1].nbytes, 1), 1)
-        for start in range(begin, stop, most):
-            piece = np.array(array[start : min(start + most, stop)])
-            if isinstance(array, np.memmap):
-                array = stack.load()  # a new map, so that what was read leaves memory
+        for start, piece in _pieces(stack, name, first, begin, stop):
             if number == 0 and start == begin:
-                warn_of_numbers(name, piece, stored, tell)
+                warn_of_numbers(name, piece, stored, note)
             counts = stored.counts_of(stack.name, piece, dead)
             if cfa is not None and counts.ndim == 4:
                 counts = mosaic(counts, cfa)
             total.add(camera, start - begin, counts)
         report("views", number + 1, stacks.size)
     if dead is not None:
-        tell(f"{np.count_nonzero(dead)} pixels of --mask count nothing")
+        note(f"{np.count_nonzero(dead)} pixels of --mask count nothing")
     if stored.bitpack:
-        warn_of_dark_columns(total.sums, "--width" if isinstance(optics, Optics) else "w", tell)
-        warn_of_bit_order(total.sums, stored.bit_order or "big", cfa, tell)
-    return total.photon_counts(cfa, name, tell)
+        warn_of_dark_columns(total.sums, "--width" if isinstance(optics, Optics) else "w", note)
+        warn_of_bit_order(total.sums, stored.bit_order or "big", cfa, note)
+    return total.photon_counts(cfa, name, note)
+
+
+def _check_frames(name: str, frames: np.ndarray | FrameFiles, stored: FrameFormat, cfa: str | None) -> None:
+    """Raise `InputError` for frames of a view that are not (T, H, row), or in three channels of a `cfa`."""
+    if frames.ndim not in (3, 4) or 0 in frames.shape or (stored.bitpack and frames.dtype != np.uint8):
+        expected = "uint8 (T, H, W / 8) with eight pixels in a byte" if stored.bitpack else "(T, H, W)"
+        raise InputError(f"{name}: expected frames {expected}, got {frames.dtype} {frames.shape}")
+    if frames.ndim == 4 and (frames.shape[3] != 3 or cfa is None):
+        raise InputError(
+            f"{name}: has {frames.shape[3]} channels; photon counts have one, or three of which --cfa says "
+            "which one each pixel keeps"
+        )
+
+
+def _pieces(
+    stack: FrameStack, name: str, first: np.ndarray | FrameFiles, begin: int, stop: int
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Frames `begin` to `stop` of a view piece by piece, each with the number of its first one.
+
+    Raises `InputError` for frames of another shape or type than the `first` ones, those of the file `name`.
+    """
+    frames = stack.load()
+    if (frames.shape, frames.dtype) != (first.shape, first.dtype):
+        shapes = [f"{one.dtype} {one.shape}" for one in (frames, first)]
+        raise InputError(f"{stack.name}: has frames {shapes[0]}, where {name} has {shapes[1]}")
+    most = max(PIECE_BYTES // max(frames[:1].nbytes, 1), 1)
+    for start in range(begin, stop, most):
+        piece = np.array(frames[start : min(start + most, stop)])
+        if isinstance(frames, np.memmap):
+            frames = stack.load()  # a new map, so that what was read leaves memory
+        yield start, piece
 
 
 class _Sum:
@@ -196,12 +205,12 @@ class _Sum:
             k, l = (np.full(frame.size, index) for index in camera)
             self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
 
-    def photon_counts(self, cfa: str | None, name: str, tell: Tell) -> PhotonCounts:
+    def photon_counts(self, cfa: str | None, name: str, note: Note) -> PhotonCounts:
         """The counts; of numbers 0 and 1 alone in light that would give others as frames of one bit."""
         if self.bits is None and not self.is_above_one:
             expected = expected_above_one(self.number, self.sums.size * self.frames)
             if expected > SURE_NATS:
-                tell(
+                note(
                     f"{name} is taken for frames of one bit: no pixel of a frame counts more than 1, where "
                     f"{expected:.3g} would by chance; if they are not, give --bits 8"
                 )
@@ -210,7 +219,7 @@ class _Sum:
         if self.bits != 1:
             return PhotonCounts.from_dense(self.sums, self.grid, **options)
         if self.singles is None or self.number > MOST_KEPT:
-            tell(
+            note(
                 f"only the sums of {self.frames} frames are kept: there are {self.number} counts, and the "
                 f"frame of each is kept for up to {MOST_KEPT}"
             )
@@ -218,145 +227,3 @@ class _Sum:
         k, l, i, j, frame = np.concatenate(self.singles).T
         n = np.ones(k.size, np.uint8)
         return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
-
-
-def _by_camera(
-    numbers: np.ndarray,
-    name: str,
-    grid: tuple[int, int] | None,
-    order: ViewOrder,
-    axes: str | None,
-    ordinary: str,
-) -> np.ndarray:
-    """An array as (A, B, ...), the table of views as stored, in the order of `AXES`.
-
-    Without `axes` it is in that order, and of a `grid` its first axis counts the views; `ordinary` are its
-    other axes in words. Raises `InputError` for other axes, and for more views than pixels in an order that
-    nobody has named.
-    """
-    if axes is None:
-        if numbers.ndim < (4 if grid is None else 3):
-            expected = f"(K, L, {ordinary}), or with --grid (N, {ordinary})"
-            raise InputError(f"{name}: expected {expected}, got {numbers.shape}")
-        axes = "KL" if grid is None else "N"
-        count = np.prod(numbers.shape[: len(axes)], dtype=np.int64)
-        # Colours of single pictures have a sentence of their own.
-        is_known = numbers.ndim - len(axes) < 2 or (numbers.ndim == 4 and numbers.shape[-1] in (3, 4))
-        if not is_known and count > max(MANY_VIEWS, np.prod(numbers.shape[len(axes) :], dtype=np.int64)):
-            raise InputError(
-                f"{name}: {numbers.shape} would be more views than each has numbers; name the order of its "
-                "axes with --axes, such as HWKL"
-            )
-    else:
-        numbers = _in_order(numbers, name, axes)
-    if "N" not in axes:
-        return numbers
-    return numbers.reshape(*order.table_of(name, numbers.shape[0], grid), *numbers.shape[1:])
-
-
-def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """An array whose axes are named, in the order of `AXES`; `InputError` for names that do not fit."""
-    names = {*axes}
-    is_known = len(names) == len(axes) and names <= {*AXES} and {*"HW"} <= names
-    if not is_known or (names & {*"KLN"}) not in ({*"KL"}, {"N"}):
-        raise InputError(
-            "--axes: expected each axis once, K and L (rows and columns of cameras) or N (views), "
-            f"T (frames), H and W (rows and columns of pixels), C (colours), such as HWKL; got {axes!r}"
-        )
-    if len(axes) != numbers.ndim:
-        raise InputError(f"{name}: has the shape {numbers.shape}, and --axes {axes} are {len(axes)} axes")
-    return numbers.transpose([axes.index(axis) for axis in AXES if axis in names])
-
-
-def _frames_of(stored: FrameFormat, key: str | None, path: Path) -> np.ndarray:
-    """The frames (T, H, row[, 3]) of a view: pages of a picture, or a file that is mapped into memory."""
-    if stored.frame_size is not None:
-        return stored.frames_in(path)
-    if is_picture(path):
-        return _of_one_channel(np.stack([*decode(picture_of(path, EXACT))]))
-    numbers = open_array(path, key)
-    return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
-
-
-def _of_one_channel(frames: np.ndarray) -> np.ndarray:
-    """Frames without the axis of their channels, if there is one channel."""
-    return frames[..., 0] if frames.ndim >= 4 and frames.shape[-1] == 1 else frames
-
-
-class FrameStack(NamedTuple):
-    """The frames of a view: `load` returns them, (T, H, row[, 3]), in memory or mapped from a file `name`."""
-
-    name: str
-    load: "Callable[[], np.ndarray | FrameFiles]"
-
-
-class FrameFiles:
-    """Files (T,) of a frame each as an array (T, H, row[, 3]), of which slices of frames are read."""
-
-    def __init__(self, stored: FrameFormat, key: str | None, paths: Sequence[Path]) -> None:
-        self.stored, self.key, self.paths = stored, key, paths
-        first = self[:1]
-        self.shape, self.ndim, self.dtype = (len(paths), *first.shape[1:]), first.ndim, first.dtype
-
-    def __len__(self) -> int:
-        return len(self.paths)
-
-    def __getitem__(self, some: slice) -> np.ndarray:
-        frames = [_frames_of(self.stored, self.key, path) for path in self.paths[some]]
-        for path, frame in zip(self.paths[some], frames, strict=True):
-            if frame.shape != (1, *frames[0].shape[1:]) or frame.dtype != frames[0].dtype:
-                raise InputError(f"{path}: expected one frame as in {self.paths[0].name}")
-        return np.concatenate(frames)
-
-
-def _stacks_of(
-    source: str | Path | np.ndarray,
-    pattern: str | None,
-    grid: tuple[int, int] | None,
-    order: ViewOrder,
-    axes: str | None,
-    key: str | None,
-    stored: FrameFormat,
-    tell: Tell,
-) -> np.ndarray:
-    """The frames of each view, (K, L) of `FrameStack`."""
-    is_table = isinstance(source, np.ndarray) and isinstance(next(iter(source.flat), None), Path)
-    if pattern is not None or is_table:
-        paths = source if is_table else files_by_camera(Path(str(source)), str(pattern), grid, order, tell)
-        paths = order.arrange(np.asarray(paths))
-        stacks = np.empty(paths.shape, object)
-        for camera, path in np.ndenumerate(paths):
-            if isinstance(path, tuple):
-                stacks[camera] = FrameStack(str(path[0]), partial(FrameFiles, stored, key, path))
-            else:
-                stacks[camera] = FrameStack(str(path), partial(_frames_of, stored, key, path))
-        return stacks
-    if stored.frame_size is not None:
-        raise InputError(f"{source}: --frame-size is for a folder of files without a header and --pattern")
-    if not isinstance(source, np.ndarray) and is_picture(Path(source)):
-        _, pages = pages_of(Path(source), grid, order, tell)
-        source, grid, order, axes = _of_one_channel(pages), None, AS_STORED, None
-    is_array = isinstance(source, np.ndarray)
-    numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
-
-    def arrange(numbers: np.ndarray) -> np.ndarray:
-        views = order.arrange(_by_camera(numbers, name, grid, order, axes, "[T,] H, W"))
-        has_frames = "T" in axes if axes else views.ndim > 4 or stored.bitpack
-        return views if has_frames else views[:, :, None]
-
-    def load(camera: tuple[int, int]) -> np.ndarray:
-        # A new map of each view, so that what was read of the others leaves memory.
-        is_mapped = not isinstance(source, np.ndarray) and isinstance(numbers, np.memmap)
-        views = arrange(open_array(Path(str(source)), key) if is_mapped else numbers)
-        return _of_one_channel(views[camera])
-
-    views = arrange(numbers)
-    if views.ndim not in (5, 6) or 0 in views.shape:
-        shape = "(K, L, T, H, W / 8) of packed bits" if stored.bitpack else "(K, L, H, W) or (K, L, N, H, W)"
-        raise InputError(f"{name}: expected {shape}, or with --grid one axis of views, got {numbers.shape}")
-    if grid is None and axes is None and numbers.ndim == 4 and numbers.shape[3] in (3, 4):
-        raise InputError(f"{name}: has the shape {numbers.shape}, with colours last; photon counts have none")
-    stacks = np.empty(views.shape[:2], object)
-    for camera in np.ndindex(*stacks.shape):
-        stacks[camera] = FrameStack(name, partial(load, camera))
-    return stacks

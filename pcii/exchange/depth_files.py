@@ -8,7 +8,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.exchange.array_files import open_array
 from pcii.exchange.pixel_files import decode, kind_of, picture_of
-from pcii.exchange.stated_cameras import Tell
+from pcii.exchange.stated_cameras import Note
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.truth import Truth
 
@@ -36,10 +36,10 @@ class DepthFile:
     depth_along_ray: bool = False
     """Depth is the distance from the camera, not along its axis."""
 
-    def truth_for(self, grid: CameraGrid, tell: Tell) -> Truth | None:
+    def truth_for(self, grid: CameraGrid, note: Note) -> Truth | None:
         """The truth of views of a `grid`, None without a file. Pixels of unknown depth count in no score.
 
-        `tell` takes how many those are. Raises `InputError`, naming the file, for a map of another size, and
+        `note` takes how many those are. Raises `InputError`, naming the file, for a map of another size, and
         for depths that are not from 0.1 mm to 100 km.
         """
         if self.depth is None:
@@ -72,14 +72,14 @@ class DepthFile:
         hit = z_mm[np.isfinite(z_mm)]
         reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
         if hit.size and hit.max() < grid.focal_mm:
-            tell(
+            note(
                 f"warning: {path.name} has depths of {reach}, nearer than the focal length of "
                 f"{grid.focal_mm:g} mm; if they are in metres, import again with --depth-unit-mm 1000"
             )
-        tell(f"with the true depth of the virtual centre, {reach}, from {path.name}")
+        note(f"with the true depth of the virtual centre, {reach}, from {path.name}")
         if is_unknown.any():
             count = np.count_nonzero(is_unknown)
-            tell(f"{count} of {z_mm.size} pixels have no known depth there, and count in no score")
+            note(f"{count} of {z_mm.size} pixels have no known depth there, and count in no score")
         return Truth(
             z_mm.astype(np.float32),
             np.where(is_unknown, UNKNOWN, 0).astype(np.int16),

@@ -1,4 +1,4 @@
-"""The formats that datasets are written in, by name; and those of single photons: events and photon cubes.
+"""The command `export`, the formats that it writes, and those of single photons: events and photon cubes.
 
     03_04/frames.npy        uint8 (T, H, ceil(W / 8)) of the camera of row 3, column 4
     03_04/transforms.json   the same as a dataset of visionsim (NPY): a pose for each of the T frames
@@ -18,12 +18,14 @@ import tarfile
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
+from cyclopts import Parameter
 
+from pcii.base.command_line import say
 from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base.progress import Report, Stages, silent
 from pcii.base.safe_files import json_bytes, named_in_errors, new_folder_safely
 from pcii.exchange.export_pictures import (
     TRANSFORMS,
@@ -37,7 +39,7 @@ from pcii.exchange.hci_scenes import write_hci
 from pcii.store.collection import COLUMNS, Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import check_free
-from pcii.types.photon_counts import FrameEvents
+from pcii.types.photon_events import FrameEvents
 from pcii.types.photon_limit import Light
 from pcii.types.truth import OPTIONAL_MAPS, Truth
 
@@ -139,12 +141,12 @@ def write_shards(
 
     Datasets that follow each other are alike, so they are in an order drawn at random, the same each time.
     """
-    of_split = dict[str, list[Path]]()
+    shards_by_split = dict[str, list[Path]]()
     order = np.random.default_rng(0).permutation(len(collection))
     for done, number in enumerate(order.tolist(), start=1):
         row = collection.rows[number]
         split = row["split"] or "all"
-        shards = of_split.setdefault(split, [])
+        shards = shards_by_split.setdefault(split, [])
         if not shards or shards[-1].stat().st_size >= SHARD_BYTES:
             shards.append(folder / f"{split}-{len(shards):06d}.tar")
         described = {name: row[name] for name in (*COLUMNS, "values")}
@@ -230,3 +232,39 @@ WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
     "photoncube": write_photon_cubes,
     "events": write_events,
 }
+
+
+def export(
+    dataset: Path,
+    *,
+    format: Format,
+    out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    budget: float | None = None,
+) -> None:
+    """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.
+
+    hci: the layout of the HCI 4D light field benchmark. nerfstudio: a PNG for each view and transforms.json
+    with the poses of the cameras, as neural reconstruction reads them. photoncube: the binary frames of each
+    view as packed bits, with poses. events: a NumPy archive of photons, cameras and truth. Each dataset of a
+    collection is written to a folder in the new one that has its name. webdataset: tar files of such
+    archives, of a collection as a whole, to stream while training.
+
+    Examples of use:
+
+        pcii export out/paper --format events -o out/paper-events
+        pcii export out/small --format nerfstudio -o out/small-poses
+        simgen export out/spad --format photoncube -o out/spad-cubes
+
+    Parameters
+    ----------
+    dataset
+        Folder of a dataset or of a collection.
+    out
+        Folder for the files: new or empty.
+    budget
+        Export the photons of this smaller, nested budget of the recipe.
+    """
+    with Stages() as report:
+        folder = export_dataset(dataset, format, out, budget=budget, report=report)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    say(f"{folder}: {len(files)} files, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")

@@ -193,7 +193,7 @@ def depths_ahead_mm(dataset: Dataset) -> np.ndarray | None:
 def intrinsics_of(dataset: Dataset) -> dict[str, Any]:
     """Members at the top of the file: focal length in px, size and, where all cameras share it, centre.
 
-    In a sheared grid each camera has a centre of its own, which its frame tells: nerfstudio would take one at
+    In a sheared grid each camera has a centre of its own, which its frame has: nerfstudio would take one at
     the top for all. The grid in mm is written too, unless the cameras have errors of calibration.
     """
     grid = dataset.grid
@@ -226,13 +226,3 @@ def write_png(path: Path, image: np.ndarray) -> None:
     import imagecodecs
 
     path.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(image)))
-
-
-def write_pfm(path: Path, values: np.ndarray) -> None:
-    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
-
-    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
-    """
-    height, width = values.shape
-    header = f"Pf\n{width} {height}\n-1\n".encode()
-    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

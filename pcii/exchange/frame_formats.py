@@ -13,7 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.exchange.array_files import open_array
 from pcii.exchange.pixel_files import decode, kind_of, picture_of
-from pcii.exchange.stated_cameras import Tell
+from pcii.exchange.stated_cameras import Note
 from pcii.types.arrays import whole_counts
 
 BitOrder = Literal["big", "little"]
@@ -161,7 +161,7 @@ def _like(dead: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return dead[..., None] if frames.ndim == 4 else dead
 
 
-def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, tell: Tell) -> None:
+def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: Note) -> None:
     """Warn of frames (T, H, W[, 3]) whose numbers look like packed bits, multiples, marks, or an offset.
 
     What is `stated` of them is not questioned.
@@ -172,7 +172,7 @@ def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, tell: Te
     if step > 1 and np.count_nonzero(stored) * np.log(step) > SURE_NATS:
         advice = f"if that is one photon, give --gain {step}"
         advice += "; if the bytes of each number are in the other order, swap them" if step % 256 == 0 else ""
-        tell(f"warning: all numbers of {name} are multiples of {step}; {advice}")
+        note(f"warning: all numbers of {name} are multiples of {step}; {advice}")
         return
     if stated.bits is not None:
         return
@@ -182,43 +182,43 @@ def warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, tell: Te
         bits = 8 * stored.dtype.itemsize
         advice = "give --mask FILE if that marks dead pixels"
         advice += f", or --bits {bits} if they are saturated" if bits <= MOST_BITS else ""
-        tell(f"warning: {marks} numbers of {name} are {most}: {advice}")
+        note(f"warning: {marks} numbers of {name} are {most}: {advice}")
         stored = stored[stored != most]
     else:
-        _warn_of_full_frames(name, stored, tell)
+        _warn_of_full_frames(name, stored, note)
     if np.count_nonzero(stored) < MIN_JUDGED:
         return
     if stored.dtype == np.uint8:
         # High bits are set about as often as the low ones; in dim counts they are rarer.
         share = np.unpackbits(stored.reshape(-1, 1), axis=-1).mean(axis=0)
         if share.max() < 0.4 and share[:4].sum() > share.sum() / 3:
-            tell(
+            note(
                 f"warning: {name} looks like bits packed eight to a byte; if so, import again with --bitpack"
             )
             return
     least, low, median = np.quantile(stored, (0.0, 0.16, 0.5))
     if least > 0 and median - low < NARROW * np.sqrt(median) - 1:
-        tell(
+        note(
             f"warning: no number of {name} is below {least:g}, and they scatter about {median:g} by "
             f"{median - low:g}, where photon counts would by {np.sqrt(median):.2g}: subtract what the camera "
             "reads without light with --offset, and divide by what a photon adds with --gain"
         )
 
 
-def _warn_of_full_frames(name: str, stored: np.ndarray, tell: Tell) -> None:
+def _warn_of_full_frames(name: str, stored: np.ndarray, note: Note) -> None:
     """Warn of numbers that pile up at the largest that some bits hold: pixels stop counting there."""
     top = int(stored.max(initial=0))
     if top < 3 or top & (top + 1):
         return
     full, next_to_it = (int(np.count_nonzero(stored == value)) for value in (top, top - 1))
     if full > 2 * next_to_it + MIN_JUDGED:
-        tell(
+        note(
             f"warning: {full / stored.size:.2g} of the numbers of {name} are {top}, more than are {top - 1}: "
             f"if frames are full there, give --bits {top.bit_length()}"
         )
 
 
-def warn_of_dark_columns(sums: np.ndarray, option: str, tell: Tell) -> None:
+def warn_of_dark_columns(sums: np.ndarray, option: str, note: Note) -> None:
     """Warn of columns at the end of packed rows without a count in any view."""
     columns = sums.sum(axis=(0, 1, 2), dtype=np.int64)
     width, lit = columns.size, int(np.flatnonzero(columns).max(initial=-1)) + 1
@@ -226,14 +226,15 @@ def warn_of_dark_columns(sums: np.ndarray, option: str, tell: Tell) -> None:
         is_padding = -(-lit // 8) == -(-width // 8)  # padding is less than a byte
         advice = f"import again with {option} {lit}" if is_padding else "cut them off the frames"
         what = f"the last {width - lit} columns of {width} have no count in any view"
-        tell(f"warning: {what}; if the camera has fewer, {advice}")
+        note(f"warning: {what}; if the camera has fewer, {advice}")
 
 
-def warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, tell: Tell) -> None:
+def warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, note: Note) -> None:
     """Warn if views (K, L, H, W) are smoother where the bits of each byte are turned round.
 
     Steps between neighbours of one colour at the ends of bytes are compared in both orders: what stands there
-    side by side is, in the wrong order, 15 pixels apart. Views and rows tell how far that is by chance.
+    side by side is, in the wrong order, 15 pixels apart. Views and rows
+    show how far that is by chance.
     """
     apart, width = (1 if cfa is None else 2), sums.shape[3] // 8 * 8
     if width < 16:
@@ -249,7 +250,7 @@ def warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, tell: 
     error = gain.std(ddof=1) / np.sqrt(gain.size) if gain.size > 1 else np.inf
     if gain.mean() > SURE_DEVIATIONS * error > 0:
         other = "little" if order == "big" else "big"
-        tell(
+        note(
             "warning: neighbours in two bytes differ as if the bits of each byte were in the other order; if "
             f"so, import again with --bit-order {other}"
         )

@@ -24,10 +24,10 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
-from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
+from pcii.exchange.export_pictures import pictures_of, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
-from pcii.exchange.stated_cameras import Optics, Tell, warn
+from pcii.exchange.stated_cameras import Note, Optics, warn
 from pcii.store.dataset import Dataset
 from pcii.store.folders import read_small
 from pcii.types.truth import Truth
@@ -51,70 +51,84 @@ def import_hci(
     encoding: Encoding | None = None,
     cfa: str | None = None,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> KnownViews:
     """Views, cameras and true depth of a folder of the HCI 4D light field benchmark.
 
     The folder has parameters.cfg, input_Cam000.png and so on row by row, and maybe gt_depth_lowres.pfm (m)
     or gt_disp_lowres.pfm (px). These maps are of the middle view, which is the virtual centre of an odd grid
-    only: of an even grid there is no truth. For `encoding` and `cfa` see `pcii.import_images`; `tell` takes
+    only: of an even grid there is no truth. For `encoding` and `cfa` see `pcii.import_images`; `note` takes
     the names of files and parameters that are not used. Raises `InputError` for what is missing or wrong.
     """
     root = Path(folder)
     known = _Parameters(root / PARAMETERS)
-    rows, cols, height, width = (
-        int(known.number(name, 1))
-        for name in ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
-    )
-    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
-    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(width, height)
-    focus_m = known.number("focus_distance_m")
-    parallax_px_mm = focal_mm * baseline_mm / pixel_mm
-    shear = parallax_px_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
-    optics = Optics(
-        pitch_mm=(baseline_mm, baseline_mm), focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=(shear, shear)
-    )
+    (rows, cols, height, width), optics = _stated_cameras(known)
     others: list[str] = []  # files that are no views are named with those of the benchmark
-    options = {"encoding": encoding, "cfa": cfa, "report": report, "tell": others.append}
+    options = {"encoding": encoding, "cfa": cfa, "report": report, "note": others.append}
     views = import_images(root, PATTERN, optics, grid=(rows, cols), **options)
     if views.grid.shape_HW != (height, width):
         raise InputError(
             f"{root / PARAMETERS}: image_resolution is {height} x {width} px, and the views are "
             f"{views.grid.height} x {views.grid.width}, rows x columns"
         )
-
-    def depth_mm(disparity_px: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore"):
-            return parallax_px_mm / (np.asarray(disparity_px, np.float64) + shear)
-
-    # A missing end, or nan as exports have it where no depths are known, says nothing.
-    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
-    try:
-        far, near = (float(depth_mm(np.array(float(end)))) for end in ends)
-    except ValueError:
-        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
-    truth = None
+    z_range_mm = _range_mm(known, optics)
     maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
+    truth = None
     if maps and (rows % 2 == 0 or cols % 2 == 0):
-        tell(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
+        note(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
     elif maps:
-        picture = picture_of(root / maps[0], ["PFM"])
-        if picture.shape[:2] != (height, width):
-            raise InputError(f"{picture.path}: is {picture.layout()}, and the views {height} x {width} px")
-        numbers = next(decode(picture))[..., 0].astype(np.float64)
-        z_mm = 1000 * numbers if maps[0] == DEPTH else depth_mm(numbers)
-        is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
-        if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
-            raise InputError(f"{picture.path}: holds depths that are not between 0.1 mm and 100 km")
-        truth = Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
-        tell(f"with the true depth of the virtual centre, {maps[0]}")
+        truth = _true_depth(root / maps[0], (height, width), optics)
+        note(f"with the true depth of the virtual centre, {maps[0]}")
     files = {path.name for path in root.iterdir() if path.is_file()}
     unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})
     if unused:
-        tell(f"not used: {listed_names(unused)}")
+        note(f"not used: {listed_names(unused)}")
     if known.texts:
-        tell(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
-    return KnownViews(views, truth, z_range_mm=(near, far) if 0 < near < far < math.inf else None)
+        note(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
+    return KnownViews(views, truth, z_range_mm)
+
+
+def _stated_cameras(known: "_Parameters") -> tuple[tuple[int, ...], Optics]:
+    """Rows and columns of cameras, height and width of images; and the optics."""
+    names = ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
+    shape = tuple(int(known.number(name, 1)) for name in names)
+    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
+    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(shape[2:])
+    focus_m = known.number("focus_distance_m")
+    shear = focal_mm * baseline_mm / pixel_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
+    pitch_mm, shear_px = (baseline_mm, baseline_mm), (shear, shear)
+    return shape, Optics(pitch_mm=pitch_mm, focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=shear_px)
+
+
+def _depth_mm(optics: Optics, disparity_px: np.ndarray) -> np.ndarray:
+    """Depths in mm of disparities in px; infinite for that of the shear."""
+    assert optics.pixel_mm is not None
+    parallax_px_mm = optics.focal_mm * optics.pitch_mm[0] / optics.pixel_mm
+    with np.errstate(divide="ignore"):
+        return parallax_px_mm / (np.asarray(disparity_px, np.float64) + optics.shear_px[0])
+
+
+def _range_mm(known: "_Parameters", optics: Optics) -> tuple[float, float] | None:
+    """Nearest and farthest depth; a missing end says nothing, nor does nan, by which exports say so."""
+    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
+    try:
+        far, near = (float(_depth_mm(optics, np.array(float(end)))) for end in ends)
+    except ValueError:
+        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
+    return (near, far) if 0 < near < far < math.inf else None
+
+
+def _true_depth(path: Path, shape_HW: tuple[int, int], optics: Optics) -> Truth:
+    """The truth of a map of depth or disparity; `InputError`, naming it, for another size or wrong depths."""
+    picture = picture_of(path, ["PFM"])
+    if picture.shape[:2] != shape_HW:
+        raise InputError(f"{path}: is {picture.layout()}, and the views {shape_HW[0]} x {shape_HW[1]} px")
+    numbers = next(decode(picture))[..., 0].astype(np.float64)
+    z_mm = 1000 * numbers if path.name == DEPTH else _depth_mm(optics, numbers)
+    is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
+    if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
+        raise InputError(f"{path}: holds depths that are not between 0.1 mm and 100 km")
+    return Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
 
 
 class _Parameters:
@@ -170,8 +184,8 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
         return baseline_mm * grid.focal_mm / (z_mm.astype(np.float64) * grid.pixel_mm) - shear_px
 
     for suffix, z_mm in _depth_maps_mm(dataset, names).items():
-        write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
-        write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
+        _write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
+        _write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
     (folder / PARAMETERS).write_text(_parameters(dataset, baseline_mm, shear_px, disparity_px))
     (folder / README).write_text(
         f"{visible(dataset.name)}: {grid.rows} x {grid.cols} integral images, row by row from the top left.\n"
@@ -267,3 +281,13 @@ def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]
         return math.nan, math.nan
     disparities = disparity_px(np.asarray(depths_mm))
     return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
+
+
+def _write_pfm(path: Path, values: np.ndarray) -> None:
+    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
+
+    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
+    """
+    height, width = values.shape
+    header = f"Pf\n{width} {height}\n-1\n".encode()
+    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

@@ -23,7 +23,7 @@ from pcii.exchange.pixel_files import (
     picture_of,
     radiance_of,
 )
-from pcii.exchange.stated_cameras import AS_STORED, Optics, Tell, ViewOrder, warn
+from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
 from pcii.types.bayer import mosaic
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
@@ -52,7 +52,7 @@ def import_images(
     encoding: Encoding | None = None,
     cfa: str | None = None,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> Views:
     """Radiance of the pictures of a folder whose names fit a pattern such as "{col}_{row}.png".
 
@@ -60,17 +60,17 @@ def import_images(
     `grid` it is square. Without a pattern `source` is a TIFF file, whose pages are counted like {index}.
     Pictures are PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one kind.
     Whole numbers are sRGB and floats are linear, unless `encoding` says otherwise. `cfa` is a Bayer pattern,
-    of which grey pictures are mosaics. `tell` takes the names of files that do not fit the pattern. Raises
+    of which grey pictures are mosaics. `note` takes the names of files that do not fit the pattern. Raises
     `InputError`, naming a file, for what does not fit.
     """
     path = Path(source)
     if pattern is None:
-        radiance = radiance_of(*pages_of(path, grid, order, tell), encoding)
+        radiance = radiance_of(*pages_of(path, grid, order, note), encoding)
     else:
-        files = order.arrange(files_by_camera(path, pattern, grid, order, tell))
+        files = order.arrange(files_by_camera(path, pattern, grid, order, note))
         if isinstance(files[0, 0], tuple):
             raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
-        radiance = radiance_of_files(files, encoding, report, tell)
+        radiance = radiance_of_files(files, encoding, report, note)
     return views_of(radiance, optics, cfa)
 
 
@@ -83,10 +83,10 @@ class KnownViews:
     z_range_mm: tuple[float, float] | None = None
 
 
-def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Report, tell: Tell) -> np.ndarray:
+def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Report, note: Note) -> np.ndarray:
     """Radiance (K, L, H, W, C) of pictures of one size and type, whose files are (K, L).
 
-    `tell` takes what else is in them. Raises `InputError`, naming the file, if one differs.
+    `note` takes what else is in them. Raises `InputError`, naming the file, if one differs.
     """
     radiance, first, unused = np.empty(0), None, []
     for done, (camera, path) in enumerate(np.ndenumerate(files), start=1):
@@ -101,7 +101,7 @@ def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Repo
         unused.append((path, picture.unused))
         radiance[camera] = radiance_of(picture, next(decode(picture)), encoding)
         report("pictures", done, files.size)
-    _tell_unused(unused, tell)
+    _tell_unused(unused, note)
     return radiance
 
 
@@ -116,7 +116,7 @@ def views_of(radiance: np.ndarray, cameras: Optics | CameraGrid, cfa: str | None
 
 
 def pages_of(
-    path: Path, grid: tuple[int, int] | None, order: ViewOrder, tell: Tell
+    path: Path, grid: tuple[int, int] | None, order: ViewOrder, note: Note
 ) -> tuple[Picture, np.ndarray]:
     """A picture that has a page for each view, and the pixels (K, L, H, W, C) of its pages.
 
@@ -129,28 +129,28 @@ def pages_of(
             f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
             "folder and --pattern"
         )
-    _tell_unused([(path, picture.unused)], tell)
+    _tell_unused([(path, picture.unused)], note)
     pixels = np.stack([*decode(picture)])
     table = order.table_of(path, picture.pages, grid)
     return picture, order.arrange(pixels.reshape(*table, *pixels.shape[1:]))
 
 
-def _tell_unused(contents: Sequence[tuple[Path, str]], tell: Tell) -> None:
+def _tell_unused(contents: Sequence[tuple[Path, str]], note: Note) -> None:
     """Name what is not used of the content of files."""
     names = [f"{content} in {path.name}" for path, content in contents if content]
     if names:
-        tell(f"not used: {listed_names(names)}")
+        note(f"not used: {listed_names(names)}")
 
 
 def files_by_camera(
-    folder: Path, pattern: str, grid: tuple[int, int] | None, order: ViewOrder, tell: Tell
+    folder: Path, pattern: str, grid: tuple[int, int] | None, order: ViewOrder, note: Note
 ) -> np.ndarray:
     """Paths (A, B), object, of the files in `folder` that fit the pattern, in the order of their numbers.
 
     With {frame} each is a tuple of paths, those of the frames of a view.
     Axes are {row} and {col}; the numbers of {index} count along the table in which the `order` stores a
     `grid`. Numbers may begin anywhere and have a sign; endings in capitals fit too. Raises `InputError` for a
-    pattern that is none, for files that are missing and for two of one view; `tell` takes the names of other
+    pattern that is none, for files that are missing and for two of one view; `note` takes the names of other
     files.
     """
     expression, names = _expression(pattern)
@@ -173,7 +173,7 @@ def files_by_camera(
         hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
         raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
     if others:
-        tell(f"not used: {listed_names(others)}, since --pattern does not fit")
+        note(f"not used: {listed_names(others)}, since --pattern does not fit")
     numbers = np.array([*files])
     first, last = numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist()
     size = tuple(end - begin + 1 for begin, end in zip(first, last, strict=True))
@@ -269,7 +269,7 @@ def import_lens_array(
     order: ViewOrder = AS_STORED,
     encoding: Encoding | None = None,
     cfa: str | None = None,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> Views:
     """Radiance of the elemental images of a picture of a lens array, cut apart.
 
@@ -279,7 +279,7 @@ def import_lens_array(
     is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
     `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
     """
-    picture = _single_picture(Path(path), tell)
+    picture = _single_picture(Path(path), note)
     height, width, channels = picture.shape
     optics = replace(optics, pixel_mm=optics.pixel_of(width), sensor_mm=None)
     across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
@@ -290,7 +290,7 @@ def import_lens_array(
         int((height - down[-1]) / lenses.pitch_px[1]) - 1,
     ]
     if max(beyond) > 0:
-        tell(f"not used: room for {beyond[0]} more columns and {beyond[1]} more rows of lens images")
+        note(f"not used: room for {beyond[0]} more columns and {beyond[1]} more rows of lens images")
     starts_evenly = not (np.concatenate([across, down]) % 2).any()
     if cfa is not None and channels == 1 and (lenses.inverted or not starts_evenly):
         raise InputError(
@@ -304,12 +304,12 @@ def import_lens_array(
     return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
 
 
-def _single_picture(path: Path, tell: Tell) -> Picture:
-    """The picture of a file that holds one; `tell` takes what else is in it."""
+def _single_picture(path: Path, note: Note) -> Picture:
+    """The picture of a file that holds one; `note` takes what else is in it."""
     picture = picture_of(path, VIEWS)
     if picture.pages > 1:
         raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    _tell_unused([(path, picture.unused)], tell)
+    _tell_unused([(path, picture.unused)], note)
     return picture
 
 
@@ -321,7 +321,7 @@ def import_interlaced(
     order: ViewOrder = AS_STORED,
     encoding: Encoding | None = None,
     cfa: str | None = None,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> Views:
     """Radiance of a picture that has a pixel of each view in every block of `interlaced` (K, L) pixels.
 
@@ -329,7 +329,7 @@ def import_interlaced(
     those of views; `sensor_mm` is the width of the whole picture. Raises `InputError` for a picture of no
     whole number of blocks, and for a mosaic.
     """
-    picture = _single_picture(Path(path), tell)
+    picture = _single_picture(Path(path), note)
     (height, width, channels), (rows, cols) = picture.shape, interlaced
     if min(rows, cols) < 1 or height % rows or width % cols:
         raise InputError(

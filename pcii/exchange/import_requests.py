@@ -25,7 +25,7 @@ from pcii.exchange.image_folders import (
 )
 from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.posed_views import import_posed_cubes, import_posed_pictures
-from pcii.exchange.stated_cameras import Optics, Tell, ViewOrder
+from pcii.exchange.stated_cameras import Note, Optics, ViewOrder
 from pcii.exchange.transforms_file import read_transforms, transforms_in
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -103,7 +103,7 @@ READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
     import_posed_pictures: ("pictures with a transforms.json", ()),
     import_posed_cubes: ("photon cubes with a transforms.json", ("counts",)),
 }
-"""What a reader reads, and the options that it meets without being told."""
+"""What a reader reads, and the flags that it meets by its nature."""
 GROUPS: dict[str, type[Any]] = {
     "optics": Cameras,
     "order": ViewOrder,
@@ -122,7 +122,7 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
     is_counts = any(options[name] for name in ("counts", "bits", "bitpack", "frame_size"))
     if pattern is None and options["lens_array"] is None:
         if transforms_in(source) is not None:
-            has_cubes = read_transforms(source, tell=lambda sentence: None).has_cubes
+            has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
             return import_posed_cubes if has_cubes else import_posed_pictures
         if (source / PARAMETERS).is_file():
             return import_hci
@@ -149,7 +149,7 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any
     return import_images if source.is_dir() or is_picture(source) else import_arrays
 
 
-def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell) -> Imported:
+def read(source: Path, options: Mapping[str, Any], *, report: Report, note: Note) -> Imported:
     """Read a source with the reader that it asks for.
 
     `options` are the values of all options by name, None or False where they were not given. Raises
@@ -165,7 +165,7 @@ def read(source: Path, options: Mapping[str, Any], *, report: Report, tell: Tell
     others = ", ".join(f"--{name.replace('_', '-')}" for name in names if name not in accepted)
     if others:
         raise InputError(f"{others}: not for {source}, which is read as {what}")
-    values = {"report": report, "tell": tell, **options}
+    values = {"report": report, "note": note, **options}
     for name, build in (("lenses", _lens_array), ("optics", _optics), ("encoding", _encoding)):
         if name in parameters:
             values[name] = build(options)

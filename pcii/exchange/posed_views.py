@@ -17,7 +17,7 @@ from pcii.exchange.export_pictures import MM_PER_M
 from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
 from pcii.exchange.image_folders import radiance_of_files, views_of
 from pcii.exchange.pixel_files import Encoding
-from pcii.exchange.stated_cameras import Tell, warn
+from pcii.exchange.stated_cameras import Note, warn
 from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
@@ -38,7 +38,7 @@ USUAL_PIXEL_MM = 0.005
 
 @dataclass(frozen=True, eq=False)
 class PoseGrid:
-    """Which frame is which camera, and what poses and principal points tell of the grid.
+    """Which frame is which camera, and what poses and principal points say of the grid.
 
     An axis with one camera has the pitch of the other; a single camera has 1 mm.
     """
@@ -60,20 +60,20 @@ def import_posed_pictures(
     encoding: Encoding | None = None,
     cfa: str | None = None,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> Views:
     """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
 
-    The file tells the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
+    The file has the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
     says how large the film is. Whole numbers are sRGB and floats linear, unless `encoding` says otherwise;
     `cfa` is a Bayer pattern, of which grey pictures are mosaics. Raises `InputError`, naming file and member,
     frame or picture, for what is missing, wrong, or no such grid.
     """
-    file = read_transforms(source, tell=tell)
+    file = read_transforms(source, note=note)
     poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
+    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
     files = np.array(file.file_paths, object)[poses.numbers]
-    radiance = radiance_of_files(files, encoding, report, tell)
+    radiance = radiance_of_files(files, encoding, report, note)
     if radiance.shape[2:4] != grid.shape_HW:
         raise InputError(
             f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "
@@ -92,7 +92,7 @@ def import_posed_cubes(
     frames: tuple[int, int] | None = None,
     stored: FrameFormat = AS_COUNTED,
     report: Report = silent,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> PhotonCounts:
     """Photon counts of the photon cubes that a transforms.json names, whose cameras are those of pictures.
 
@@ -101,11 +101,11 @@ def import_posed_cubes(
     and the last to add up; `cfa` is the Bayer pattern where the file has none. Raises `InputError`, naming
     the file, for cubes that differ from what it says.
     """
-    file = read_transforms(source, tell=tell)
+    file = read_transforms(source, note=note)
     if file.cfa is not None and cfa not in (None, file.cfa):
         raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
     poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
+    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
     paths = np.array(file.file_paths, object)[poses.numbers]
     first = open_array(paths[0, 0])
     channels = first.shape[3] if first.ndim == 4 else 1
@@ -113,7 +113,7 @@ def import_posed_cubes(
         raise InputError(f"{file.path}: c: is {file.channels}, and {paths[0, 0]} has {channels} channels")
     if stored.bitpack or file.is_bitpacked:
         stored = replace(stored, bitpack=True, width=grid.width)
-    options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "tell": tell}
+    options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "note": note}
     return import_counts(paths, grid, stored=stored, **options)
 
 
@@ -123,7 +123,7 @@ def camera_grid_of(
     focal_mm: float | None,
     pixel_mm: float | None,
     sensor_mm: float | None,
-    tell: Tell = warn,
+    note: Note = warn,
 ) -> CameraGrid:
     """The camera grid in mm: poses give pitch and shear, one length of the film the others.
 
@@ -131,20 +131,20 @@ def camera_grid_of(
     """
     lengths = [length for length in (focal_mm, pixel_mm, sensor_mm) if length is not None]
     if len(lengths) > 1:
-        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file tells their ratio")
+        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
     if focal_mm is not None:
         pixel_mm = focal_mm / file.focal_px
     else:
         pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
         focal_mm = _digits(file.focal_px * pixel_mm)
     if not lengths:
-        tell(
+        note(
             f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
             "its ratio, and nothing else of them matters"
         )
     if any(poses.offset_px):
         x, y = poses.offset_px
-        tell(
+        note(
             f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
             "below it, alike in all: sections and depth are in the frame of the pictures"
         )

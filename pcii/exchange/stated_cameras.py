@@ -12,7 +12,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.types.camera_grid import CameraGrid
 
-Tell = Callable[[str], None]
+Note = Callable[[str], None]
 """Takes a sentence on what is left out or assumed."""
 
 

@@ -21,7 +21,7 @@ from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
 from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
-from pcii.exchange.stated_cameras import Tell, warn
+from pcii.exchange.stated_cameras import Note, warn
 from pcii.store.folders import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
@@ -117,11 +117,11 @@ def transforms_in(source: Path) -> Path | None:
     return source / TRANSFORMS if (source / TRANSFORMS).is_file() else None
 
 
-def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
+def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     """Read a transforms.json of anybody, or that of a folder.
 
     A picture is opened only where the file does not say its size. Intrinsics of a frame win over those at the
-    top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `tell`
+    top; without `fl_x` an angle of view tells the focal length. Places are divided by `applied_scale`. `note`
     takes the names of members that are not used. Raises `InputError`, naming file and member, for what is
     missing or wrong, pixels that are not square, lenses that distort, frames of different size or focal
     length, matrices that are no poses, paths that are used twice or lead out of the folder, photon cubes that
@@ -129,33 +129,20 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     """
     file = transforms_in(Path(path)) or Path(path)
     document = _parsed(file)
-    frames = document.frames
-    is_single_cube = document.file_path is not None
-    named = [("", document)] if is_single_cube else [(f"frames.{n}.", f) for n, f in enumerate(frames)]
-    paths = [_path(file, f"{place}file_path", one.file_path) for place, one in named]
+    frames, is_single_cube = document.frames, document.file_path is not None
+    paths = _paths(file, document)
     has_cubes = is_single_cube or document.bitpack is True or any(path.suffix == ".npy" for path in paths)
     if has_cubes and any(path.suffix != ".npy" for path in paths):
         raise InputError(f"{file}: file_path: expected .npy files, since photon cubes are in such files")
     if document.bitpack and document.bitpack_dim not in (None, 2):
         raise InputError(f"{file}: bitpack_dim: expected 2, the width, got {document.bitpack_dim}")
-    if len({*paths}) < len(paths):
-        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
-        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
     if None in (document.w or frames[0].w, document.h or frames[0].h):
         if has_cubes:
             raise InputError(f"{file}: w, h: missing; the width and height of the frames in pixels")
         document.h, document.w, _ = picture_of(paths[0], VIEWS).shape
-    lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(frames)]
-    width, height, focal_px, _ = lenses[0]
-    for number, (w, h, f, _) in enumerate(lenses):
-        if (w, h) != (width, height) or abs(f - focal_px) * max(w, h) / 2 > MOST_PX * focal_px:
-            raise InputError(
-                f"{file}: frames.{number}: {h} x {w} px and a focal length of {f:g} px, where the first "
-                f"frame has {height} x {width} and {focal_px:g}; cameras of a grid are alike"
-            )
+    (width, height, focal_px), centres_px = _common_lens(file, document)
     poses = np.stack([_pose(file, n, frame.transform_matrix) for n, frame in enumerate(frames)])
     poses[:, :3, 3] /= document.applied_scale or 1
-    centres_px = np.array([centre for *_, centre in lenses])
     if is_single_cube:
         if np.ptp(poses, axis=0).max() + np.ptp(centres_px, axis=0).max() > ROUNDING:
             raise InputError(f"{file}: frames: the camera moves, and a moving camera is no grid")
@@ -164,7 +151,7 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
     if not has_cubes:
         unused |= {name: 0 for name in ("cfa", "c") if getattr(document, name) is not None}
     if unused:
-        tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
+        note(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
         path=file,
         poses=poses,
@@ -172,7 +159,7 @@ def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
         focal_px=focal_px,
         width=width,
         height=height,
-        file_paths=tuple(paths),
+        file_paths=paths,
         has_cubes=has_cubes,
         is_bitpacked=document.bitpack is True,
         channels=document.c,
@@ -193,6 +180,18 @@ def _parsed(file: Path) -> _Document:
         raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
 
 
+def _paths(file: Path, document: _Document) -> tuple[Path, ...]:
+    """The picture or cube of each frame, or that of a single camera; `InputError` for one of two frames."""
+    if document.file_path is not None:
+        return (_path(file, "file_path", document.file_path),)
+    frames = enumerate(document.frames)
+    paths = tuple(_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in frames)
+    if len({*paths}) < len(paths):
+        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
+        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
+    return paths
+
+
 def _path(file: Path, member: str, text: str | None) -> Path:
     """The file that a member names, in the folder; without its ending if that is found."""
     inside = PurePosixPath((text or "").replace("\\", "/"))
@@ -203,6 +202,19 @@ def _path(file: Path, member: str, text: str | None) -> Path:
     path = file.parent / inside
     endings = (path.with_name(path.name + ending) for ending in ENDINGS)
     return path if path.exists() else next((other for other in endings if other.is_file()), path)
+
+
+def _common_lens(file: Path, document: _Document) -> tuple[tuple[int, int, float], np.ndarray]:
+    """Width, height and focal length in px, alike in all frames, and their principal points (N, 2)."""
+    lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(document.frames)]
+    width, height, focal_px, _ = lenses[0]
+    for number, (w, h, f, _) in enumerate(lenses):
+        if (w, h) != (width, height) or abs(f - focal_px) * max(w, h) / 2 > MOST_PX * focal_px:
+            raise InputError(
+                f"{file}: frames.{number}: {h} x {w} px and a focal length of {f:g} px, where the first "
+                f"frame has {height} x {width} and {focal_px:g}; cameras of a grid are alike"
+            )
+    return (width, height, focal_px), np.array([centre for *_, centre in lenses])
 
 
 def _lens(file: Path, place: str, top: _Lens, frame: _Lens) -> tuple[int, int, float, tuple[float, float]]:

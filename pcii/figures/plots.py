@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pcii.base.blocks import evenly_chosen
 from pcii.base.errors import InputError
 from pcii.base.plain_text import in_html
 from pcii.figures.panels import (
@@ -34,7 +35,6 @@ from pcii.figures.pictures import (
     photon_picture,
     uri_of,
 )
-from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.imaging.mask_outlines import object_share
 from pcii.metrics.bounds import object_bounds
 from pcii.metrics.depth_accuracy import depth_errors
 from pcii.metrics.true_masks import KINDS, TrueFocus, mask_agreement, photon_agreement
@@ -84,10 +83,10 @@ def score(
         for each in methods:
             if each.sections is sections:
                 rows += _plane_rows(each, pooled, true)
-    of_objects: list[dict[str, Any]] = []
+    object_rows: list[dict[str, Any]] = []
     if truth is not None:
-        of_objects = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    bounds = {"objects": of_objects}
+        object_rows = object_bounds(truth, full_light, methods[0].sections if methods else None)
+    bounds = {"objects": object_rows}
     readout = asdict(methods[0].sections.readout) if methods else None
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
@@ -118,6 +117,23 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
                 }
             )
     return rows
+
+
+def object_share(mask: np.ndarray, object_id: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+    """Share of the area of each pixel that a mask (H, W) of objects covers, float64 (H, W).
+
+    `coverage` is the share of each pixel that belongs to the object of its own `object_id`. The rest
+    belongs to its neighbours (of eight) of other objects, to each of them equally.
+    """
+    other_count = np.zeros(mask.shape)
+    masked_count = np.zeros(mask.shape)
+    ids, inside = np.pad(object_id, 1, mode="edge"), np.pad(mask, 1, mode="edge")
+    H, W = mask.shape
+    for i, j in np.ndindex(3, 3):
+        is_other = ids[i : i + H, j : j + W] != object_id
+        other_count += is_other
+        masked_count += is_other & inside[i : i + H, j : j + W]
+    return coverage * mask + (1 - coverage) * masked_count / np.maximum(other_count, 1)
 
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:

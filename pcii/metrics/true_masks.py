@@ -1,4 +1,4 @@
-"""True in-focus masks of sections, by object and by pixel, and how well masks and photons agree with them."""
+"""True in-focus masks of sections, by object and by pixel; how masks, outlines, photons agree with them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +7,6 @@ from typing import Any, Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.imaging.mask_outlines import boundary_f
 from pcii.types.estimates import Segmented
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import blur_half_extent_px
@@ -21,6 +20,8 @@ OBJECT_REACH_PX, OBJECT_SHARE = 4.0, 0.9
 With a shorter reach bulky things are not scored, with a longer one floors are. Of the 114 objects in the
 scenes of the benchmark 96 belong to a plane; reaches of 3 and 6 px change none and 3 of them, shares of 0.95
 and 0.8 none and 1."""
+OUTLINE_TOLERANCE_PX = 2.0
+"""Outlines agree where they are at most this far apart."""
 
 Kind = Literal["object", "pixel"]
 KINDS: tuple[Kind, ...] = ("object", "pixel")
@@ -54,7 +55,7 @@ class TrueFocus:
 
     def names_at(self, plane: int) -> list[str]:
         """Names of the objects that belong to a plane."""
-        return [self.truth.names[number] for number, own in self.plane_of.items() if own == plane]
+        return [self.truth.names[number] for number, nearest in self.plane_of.items() if nearest == plane]
 
     @cached_property
     def by_object(self) -> np.ndarray:
@@ -151,16 +152,16 @@ def photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> di
         claimed = _by_photon(focus.photon_in_focus[plane], photons)[inside]
     object_id = photons.object_id[inside]
     blur_px = blur_half_extent_px(true.planes.grid, photons.z_mm[inside], focus.z_mm[plane])
-    own_objects = [number for number, own in true.plane_of.items() if own == plane]
-    right = {"object": np.isin(object_id, own_objects), "pixel": blur_px <= FOCUS_TOLERANCE_PX}
+    objects_at = [number for number, nearest in true.plane_of.items() if nearest == plane]
+    right = {"object": np.isin(object_id, objects_at), "pixel": blur_px <= FOCUS_TOLERANCE_PX}
     rows: dict[Kind, Row] = {}
     for kind in KINDS:
         counted = ~true.is_free(kind, object_id, blur_px)
-        kept, own = claimed & counted, right[kind] & counted
-        both = int(np.count_nonzero(kept & own))
+        kept, to_keep = claimed & counted, right[kind] & counted
+        both = int(np.count_nonzero(kept & to_keep))
         rows[kind] = {
             "photon_precision": both / int(kept.sum()) if kept.any() else None,
-            "photon_recall": both / int(own.sum()) if own.any() else None,
+            "photon_recall": both / int(to_keep.sum()) if to_keep.any() else None,
         }
     return rows
 
@@ -176,3 +177,45 @@ def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
             "for other counts give dataclasses.replace(truth, photons=None)"
         )
     return by_event[event]
+
+
+def boundary_f(claimed: np.ndarray, true: np.ndarray, true_share: np.ndarray | None = None) -> float:
+    """F-measure of the outlines of two masks (H, W): shares of each within 2 px of the other.
+
+    If `true_share` (H, W), the share of each pixel's area that is true, is given, both outlines are lines:
+    the true one where the share is one half, linear between pixel centres, the claimed one midway between
+    pixels. Else they are the outermost pixels of the masks. The frame's border is no outline. The result
+    is 0 if a mask has no outline.
+
+    >>> mask = np.pad(np.ones((4, 4), dtype=bool), 8)
+    >>> boundary_f(mask, mask), boundary_f(mask, np.roll(mask, 6, axis=1))
+    (1.0, 0.0)
+    """
+    from scipy.spatial import KDTree
+
+    if true_share is None:
+        claimed_px, true_px = _outermost_px(claimed), _outermost_px(true)
+    else:
+        claimed_px, true_px = _line_px(claimed), _line_px(true_share)
+    if not (len(claimed_px) and len(true_px)):
+        return 0.0
+    precision = (KDTree(true_px).query(claimed_px)[0] <= OUTLINE_TOLERANCE_PX).mean()
+    recall = (KDTree(claimed_px).query(true_px)[0] <= OUTLINE_TOLERANCE_PX).mean()
+    total = precision + recall
+    return float(2 * precision * recall / total) if total else 0.0
+
+
+def _outermost_px(mask: np.ndarray) -> np.ndarray:
+    """Row and column (N, 2) of the pixels of the mask with a neighbour (of four) outside it."""
+    p = np.pad(mask, 1, mode="edge")
+    return np.argwhere(mask & ~(p[:-2, 1:-1] & p[2:, 1:-1] & p[1:-1, :-2] & p[1:-1, 2:]))
+
+
+def _line_px(share: np.ndarray) -> np.ndarray:
+    """Points (N, 2), row and column, along the lines where shares are one half, at most 0.71 px apart."""
+    from skimage.measure import find_contours
+
+    # Contours run through squares of four pixel centres, so a picture one pixel wide is repeated.
+    wide = np.pad(share.astype(np.float64), [(0, int(size < 2)) for size in share.shape], mode="edge")
+    lines = [np.concatenate([line, (line[1:] + line[:-1]) / 2]) for line in find_contours(wide, 0.5)]
+    return np.concatenate([np.zeros((0, 2)), *lines])

@@ -1,15 +1,33 @@
-"""Removal methods by name: which points of each section are in focus."""
+"""Removal methods by name: which points of each section are in focus.
 
-from pcii.base.extensions import MethodRegistry
-from pcii.depth.depth_planes import check_range_mm
-from pcii.removal import plugins
+Another package registers one as an entry point of the group `pcii.methods`:
+
+    [project.entry-points."pcii.methods"]
+    my-method = "my_package:remove"
+
+`remove` is called with the `PhotonCounts` and their `Sections` at the requested planes, and returns a
+`Segmented` of these sections. Entry points are read, and the package imported, only when a method is
+requested that is not built in.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.extensions import MethodRegistry, called
+from pcii.depth.methods import check_range_mm
 from pcii.removal.posterior_masks import remove_by_network
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import Segmented
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.focal_planes import check_depth_counts
 from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
+
+GROUP = "pcii.methods"
+Method = Callable[[PhotonCounts, Sections], Segmented]
 
 
 def segment(
@@ -17,7 +35,7 @@ def segment(
     z_mm: object,
     *,
     z_range_mm: tuple[float, float] | None = None,
-    method: str | plugins.Method = "posterior",
+    method: str | Method = "posterior",
 ) -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
@@ -66,18 +84,67 @@ def removal_methods() -> tuple[str, ...]:
     return REGISTRY.names()
 
 
-def find_method(method: str | plugins.Method) -> plugins.Method:
+def find_method(method: str | Method) -> Method:
     """The removal of this name, or a function, checked; `InputError` listing the known names."""
     return REGISTRY.find(method, "removal")
 
 
-METHODS: dict[str, plugins.Method | str] = {
+def _checked(remove: Callable[..., object], label: str, name: str | None) -> Method:
+    """The method of a function that may do anything: it raises `InputError`, which begins with `label`.
+
+    It does so where `called` does, and if the result is not a `Segmented` of the given sections, whose method
+    is `name` if that is given.
+    """
+
+    def method(counts: PhotonCounts, sections: Sections) -> Segmented:
+        result = called(remove, label, counts, sections)
+        if not isinstance(result, Segmented):
+            advice = "; for a method of depth write depth: before it" if isinstance(result, DepthMap) else ""
+            raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}{advice}")
+        requirement = _unmet_requirement(result, name, counts, sections)
+        if requirement:
+            raise InputError(f"{label} must return {requirement}")
+        return result
+
+    return method
+
+
+def _is_map(array: object, shape: tuple[int, ...]) -> bool:
+    """Whether this is an array (Z, H M, W M) for the shape (Z, H, W) and a whole number M."""
+    if not isinstance(array, np.ndarray) or array.ndim != 3:
+        return False
+    (Z, H, W), finer = shape, array.shape[1] // shape[1]
+    return finer >= 1 and array.shape == (Z, H * finer, W * finer)
+
+
+def _unmet_requirement(
+    result: Segmented, name: str | None, counts: PhotonCounts, sections: Sections
+) -> str | None:
+    """The first requirement that the result of a method does not meet, in words; None if it meets all."""
+    if result.sections is not sections:
+        return "a Segmented of the sections that it was given"
+    if name is not None and result.method != name:
+        return f"its own name as `method`, not {result.method!r}"
+    if not isinstance(result.method, str):
+        return f"a name as `method`, not {result.method!r}"
+    if not isinstance(result.steps, Mapping):
+        return "maps by their names in `steps`"
+    for step, array in result.steps.items():
+        if not _is_map(array, result.in_focus.shape):
+            return f"maps {result.in_focus.shape} in `steps`, and {step!r} is none"
+    kept, events = result.photon_in_focus, counts.events.n.size
+    if kept is not None and kept.shape[1] != events:
+        return f"photon_in_focus for the {events} events of the counts, not for {kept.shape[1]}"
+    return None
+
+
+METHODS: dict[str, Method | str] = {
     "three-step": ThreeStep(),
     "posterior": remove_by_network,
-    "brightness": "pcii.baselines.simple_removals:brightness",
-    "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",
+    "brightness": "pcii.removal.simple_removals:brightness",
+    "shape-from-focus": "pcii.removal.simple_removals:shape_from_focus",
 }
 """The built-in methods; those to compare with are loaded when they are asked for."""
-REGISTRY = MethodRegistry(plugins.GROUP, METHODS, plugins.checked)
+REGISTRY = MethodRegistry(GROUP, METHODS, _checked)
 DEFAULT_METHODS = ("three-step", "posterior")
 """The methods of `pcii run` without `--method`."""

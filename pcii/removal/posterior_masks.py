@@ -7,9 +7,9 @@ probable one. Nothing is claimed where the depth map has no answer.
 
 import numpy as np
 
-from pcii.depth.depth_planes import check_search
+from pcii.base.blocks import on_pixels
+from pcii.depth.methods import check_search
 from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.imaging.blocks import on_pixels
 from pcii.types.estimates import DepthPosterior, Segmented
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
@@ -30,12 +30,12 @@ def remove_by_network(
 def masks_of(posterior: DepthPosterior, sections: Sections) -> Segmented:
     """In-focus masks of the sections, at whose planes the posterior was requested."""
     # A plane that is requested twice counts once.
-    _, of_planes = np.unique(sections.planes.z_mm, return_index=True)
-    of_none = 1 - posterior.in_focus[of_planes].sum(axis=0)
-    is_own = posterior.in_focus >= np.maximum(posterior.in_focus.max(axis=0), of_none)
+    _, first_requests = np.unique(sections.planes.z_mm, return_index=True)
+    out_of_focus = 1 - posterior.in_focus[first_requests].sum(axis=0)
+    is_most_probable = posterior.in_focus >= np.maximum(posterior.in_focus.max(axis=0), out_of_focus)
     masks, probability = (
         on_pixels(blocks, posterior.block_px, posterior.planes.grid.shape_HW)
-        for blocks in (is_own & posterior.is_detected, posterior.in_focus)
+        for blocks in (is_most_probable & posterior.is_detected, posterior.in_focus)
     )
     steps, hot_pixels = {"probability": probability}, posterior.hot_pixels
     return Segmented(masks, "posterior", sections, steps, hot_pixels=hot_pixels)

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.imaging.blocks import sum_of
+from pcii.base.blocks import sum_of
 from pcii.types.bayer import colour_index
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.images import Views
-from pcii.types.photon_counts import NEGLIGIBLE_LOSS, PhotonCounts, Readout
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.readout import NEGLIGIBLE_LOSS, Readout
 from pcii.types.section_stack import Sections
 
 GREY_LEVELS = 256
@@ -213,11 +214,12 @@ def saturation_loss(counts: PhotonCounts) -> float:
     arrived = 0.0
     for number in range(grid.view_count):
         if counts.is_sparse:  # whole images of few photons would take ten times as long
-            events, own = counts.events, slice(*counts.view_starts[number : number + 2])
-            of, n = block[events.i[own].astype(np.int64) * grid.width + events.j[own]], events.n[own]
+            events, view = counts.events, slice(*counts.view_starts[number : number + 2])
+            pixel = events.i[view].astype(np.int64) * grid.width + events.j[view]
+            blocks, n = block[pixel], events.n[view]
         else:
-            of, n = block, counts.view(*divmod(number, grid.cols)).ravel()
-        counted = np.bincount(of, n, minlength=trials.size)
+            blocks, n = block, counts.view(*divmod(number, grid.cols)).ravel()
+        counted = np.bincount(blocks, n, minlength=trials.size)
         lit = counted > 0
         arrived += float(_photons(counted[lit], trials[lit], counts.readout).sum())
     return max(0.0, 1 - counts.total / arrived)

@@ -16,7 +16,8 @@ from pcii.types.arrays import LARGEST_COUNT, is_whole
 from pcii.types.bayer import colour_cells
 from pcii.types.focal_planes import FocalPlanes, check_data
 from pcii.types.images import Views
-from pcii.types.photon_counts import PLAIN, PhotonCounts
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.readout import PLAIN
 from pcii.types.section_stack import Sections, Shifts
 
 DENSE_SHARE = 1 / 16

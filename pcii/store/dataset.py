@@ -13,6 +13,7 @@ from pcii.base.errors import InputError
 from pcii.base.safe_files import new_folder_safely
 from pcii.base.short_form import ShortForm, listed, times
 from pcii.store.dataset_layout import (
+    ARRAYS,
     COUNTS,
     FRAME,
     MANIFEST,
@@ -23,9 +24,9 @@ from pcii.store.dataset_layout import (
     radiance_name,
     read_exr,
     read_manifest,
+    read_packed,
 )
-from pcii.store.folders import Files, check_file, check_free, lists_part, read_part
-from pcii.store.packed_arrays import ARRAYS, read_packed
+from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
 from pcii.store.zarr_groups import read_array
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.types.camera_grid import CameraGrid
@@ -56,8 +57,8 @@ class StoredRadiance:
         name = radiance_name(*index)
         if name not in self._files:
             raise InputError(f"{self._root}: the manifest lists no {name}")
-        check_file(self._root, name, self._files[name])
-        return read_exr(self._root / name, self.shape[2:])
+        content = read_listed(self._root, name, self._files[name])
+        return read_exr(self._root / name, self.shape[2:], content)
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
         """All views, read into memory; raises `ValueError` if NumPy asks for them without a copy."""
@@ -126,9 +127,9 @@ class Dataset(ShortForm):
 
         The scope is its own, whatever that of `light`. Raises `InputError` for a light that is not there.
         """
-        for own in self.lights:
-            if str(own) == str(light):
-                return replace(self, choice=None if own in self._counted[-1:] else own)
+        for stored in self.lights:
+            if str(stored) == str(light):
+                return replace(self, choice=None if stored in self._counted[-1:] else stored)
         known = ", ".join(map(str, self.lights)) or "none"
         raise InputError(f"{self.path}: has no budget {light}; there are {known}")
 
@@ -243,8 +244,8 @@ class Dataset(ShortForm):
             raise InputError(
                 f"{self.path / MANIFEST}: files: there is no {ARRAYS}, which is to hold what is packed"
             )
-        check_file(self.path, ARRAYS, self.manifest.files[ARRAYS])
-        return read_packed(self.path, self.manifest.packed)
+        archive = read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS])
+        return read_packed(self.path / ARRAYS, archive, self.manifest.packed)
 
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
@@ -272,7 +273,7 @@ def open_dataset(path: str | Path) -> Dataset:
     root = Path(path)
     manifest = read_manifest(root)
     for name, entry in manifest.files.items():
-        check_file(root, name, entry, content=False)
+        check_size(root, name, entry)
     return Dataset(root, manifest)
 
 

@@ -7,13 +7,19 @@
     photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
     truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
     radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
+    arrays.zip               in place of the .zarr folders, where many small files would be a burden
+
+The archive is a ZIP file as the zip stores of Zarr are: without compression, since chunks are compressed
+already. Its members are in order and without dates, so that the same arrays make the same bytes.
 
 The manifest is written last and lists what belongs to the dataset: a dataset without a manifest is
 unfinished, a file whose hash differs is damaged, and what is not listed is not read.
 """
 
 import io
-from collections.abc import Mapping
+import shutil
+import zipfile
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +27,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
-from pcii.store.folders import FolderKind
+from pcii.store.folders import REMEDY, FolderKind
 
 if TYPE_CHECKING:
     from pcii.store.manifests import DatasetManifest
@@ -37,6 +43,7 @@ FRAME = "frame"
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
+ARRAYS = "arrays.zip"
 WORTH_ZIP = 0.9
 """Radiance is compressed if it then takes at most this share of its bytes."""
 DATASET_FOLDER = FolderKind("dataset", MANIFEST, 2, "simgen generate", frozenset({MANIFEST, MARKER}))
@@ -107,26 +114,51 @@ def _exr(image: np.ndarray, compression: object) -> bytes:
     return content.getvalue()
 
 
-def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
-    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B.
+def read_exr(path: Path, shape: tuple[int, ...] | None = None, content: bytes | None = None) -> np.ndarray:
+    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B, or from its `content`.
 
     Raises `InputError` if it cannot be read or its shape is not `shape`, if given; the shape is checked in
     the header, before memory is allocated for the pixels.
     """
     import OpenEXR
 
+    stored = io.BytesIO(path.read_bytes() if content is None else content)
     try:
-        with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
+        with OpenEXR.File(stored, header_only=True) as file:
             (left, top), (right, bottom) = (map(int, corner) for corner in file.header()["dataWindow"])
             has_y = any(channel.name == "Y" for channel in file.header()["channels"])
         names = ("Y",) if has_y else ("R", "G", "B")
         size = (bottom - top + 1, right - left + 1, len(names))
         if shape is not None and size != tuple(shape):
             raise InputError(f"{path}: expected an image {tuple(shape)}, got {size}")
-        with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
+        stored.seek(0)
+        with OpenEXR.File(stored, separate_channels=True) as file:
             channels = file.channels()
             return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
     except InputError:
         raise
     except (KeyError, RuntimeError, TypeError, ValueError) as fault:
         raise InputError(f"{path}: cannot be read as an EXR image ({fault})") from None
+
+
+def pack_arrays(root: Path, parts: Iterable[str]) -> list[str]:
+    """Move the named folders of `root` into its archive; the paths of the files in it."""
+    parts, content = list(parts), io.BytesIO()
+    paths = [path for part in parts for path in sorted((root / part).rglob("*")) if path.is_file()]
+    names = [path.relative_to(root).as_posix() for path in paths]
+    with zipfile.ZipFile(content, "w") as archive:
+        for name in names:
+            archive.writestr(zipfile.ZipInfo(name), (root / name).read_bytes())
+    write_bytes_safely(root / ARRAYS, content.getvalue())
+    for part in parts:
+        shutil.rmtree(root / part, ignore_errors=True)
+    return names
+
+
+def read_packed(path: Path, archive: bytes, names: Iterable[str]) -> dict[str, bytes]:
+    """Content of files in the archive that was read from `path`; `InputError` for one that is missing."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(archive)) as members:
+            return {name: members.read(name) for name in names}
+    except (KeyError, zipfile.BadZipFile) as fault:
+        raise InputError(f"{path}: cannot be read ({fault}); {REMEDY}") from None

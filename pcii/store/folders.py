@@ -72,29 +72,31 @@ def lists_part(files: Iterable[str], part: str) -> bool:
     return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
-def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool = True) -> None:
-    """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
+def check_size(root: Path, name: str, entry: Mapping[str, Any]) -> None:
+    """Raise `InputError` if a listed file is missing, or has another size."""
     path = root / name
+    if not path.is_file():
+        raise InputError(f"{path}: listed in the manifest but missing; {REMEDY}")
+    if path.stat().st_size != entry["bytes"]:
+        raise InputError(f"{path}: truncated or changed, expected {entry['bytes']} bytes; {REMEDY}")
+
+
+def read_listed(root: Path, name: str, entry: Mapping[str, Any]) -> bytes:
+    """Content of a listed file; `InputError` if it is missing, or has another size or hash."""
+    check_size(root, name, entry)
     try:
-        if not path.is_file():
-            fault = "listed in the manifest but missing"
-        elif path.stat().st_size != entry["bytes"]:
-            fault = f"truncated or changed, expected {entry['bytes']} bytes"
-        elif content and hash_file(path) != entry["sha256"]:
-            fault = "its content does not match the manifest's SHA-256"
-        else:
-            return
-    except OSError as error:
-        fault = f"cannot be read ({error.strerror})"
-    raise InputError(f"{path}: {fault}; {REMEDY}")
+        content = (root / name).read_bytes()
+    except OSError as fault:
+        raise InputError(f"{root / name}: cannot be read ({fault.strerror}); {REMEDY}") from None
+    if hash_bytes(content) != entry["sha256"]:
+        raise InputError(f"{root / name}: its content does not match the manifest's SHA-256; {REMEDY}")
+    return content
 
 
 def read_part(root: Path, files: Files, part: str) -> dict[str, bytes]:
-    """Content of the listed files of the folder `part` by their paths; `InputError` as `check_file`."""
+    """Content of the listed files of the folder `part` by their paths; `InputError` as `read_listed`."""
     listed = {name: entry for name, entry in files.items() if name.startswith(f"{part}/")}
-    for name, entry in listed.items():
-        check_file(root, name, entry)
-    return {name: (root / name).read_bytes() for name in listed}
+    return {name: read_listed(root, name, entry) for name, entry in listed.items()}
 
 
 def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:

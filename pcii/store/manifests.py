@@ -24,8 +24,8 @@ from pcii.base.plain_text import visible
 from pcii.types.arrays import MOST_DEPTHS
 from pcii.types.bayer import check_cfa
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import MOST_BITS, MOST_FRAMES
 from pcii.types.photon_limit import MOST_PHOTONS, Scope
+from pcii.types.readout import MOST_BITS, MOST_FRAMES
 
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 

@@ -129,8 +129,8 @@ class DepthPosterior(ShortForm):
         """
         padded = [0.0, *self.probability, 0.0]
         confidence, plane = np.full_like(self.no_surface, -1), np.zeros(self.no_surface.shape, int)
-        for z, (before, own, after) in enumerate(zip(padded, padded[1:], padded[2:], strict=False)):
-            near = own + before + after
+        for z, (before, here, after) in enumerate(zip(padded, padded[1:], padded[2:], strict=False)):
+            near = here + before + after
             plane[near > confidence] = z
             np.maximum(confidence, near, out=confidence)
         confidence = np.minimum(confidence, 1.0)

@@ -17,11 +17,11 @@ from pcii.types.camera_grid import CameraGrid
 from pcii.types.geometry import (
     depth_of_total_disparity_mm,
     disparity_px,
-    shifts_to_centre_px,
     total_disparity_px,
 )
 from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts, PhotonEvents
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_events import PhotonEvents
 from pcii.types.truth import PhotonTruth
 
 
@@ -110,7 +110,9 @@ class FocalPlanes(ShortForm):
         A point of the plane that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual
         centre, d the disparity; not a whole number in general.
         """
-        rows, cols = shifts_to_centre_px(self.grid, *disparity_px(self.grid, self.z_mm))
+        across, down = disparity_px(self.grid, self.z_mm)
+        rows = (np.arange(self.grid.rows) - (self.grid.rows - 1) / 2) * down[:, None]
+        cols = (np.arange(self.grid.cols) - (self.grid.cols - 1) / 2) * across[:, None]
         return read_only(rows), read_only(cols)
 
     @cached_property

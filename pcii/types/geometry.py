@@ -53,17 +53,6 @@ def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray
         return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
 
 
-def shifts_to_centre_px(
-    grid: CameraGrid, across: np.ndarray, down: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Shifts of rows (Z, K) and columns (Z, L) of cameras to the virtual centre, for disparities (Z,) in px.
-
-    A point that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual centre.
-    """
-    rows = (np.arange(grid.rows) - (grid.rows - 1) / 2) * down[:, None]
-    return rows, (np.arange(grid.cols) - (grid.cols - 1) / 2) * across[:, None]
-
-
 def parallax_per_total(grid: CameraGrid) -> np.ndarray:
     """(horizontal, vertical) parallax from camera to camera as a share of the total disparity, (2,)."""
     return np.array(parallax_px(grid, 1.0)) / total_disparity_px(grid, 1.0)

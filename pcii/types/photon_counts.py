@@ -1,119 +1,25 @@
-"""Photon counts of the elemental images, as sparse events or as a dense stack, and their frames.
-
-A single-photon camera divides the exposure into T equal frames. In each a pixel stops at m = 2^bits - 1
-counts; of one bit it tells whether there was a photon at all. With mu photons expected in a frame the number
-of frames with a photon is binomial, of T with the probability 1 - exp(-mu) (Fossum, "What to do with sub-
-diffraction-limit pixels? A proposal for a gigapixel digital film sensor", 2005; Yang et al., "Bits from
-photons", IEEE Trans. Image Process. 21, 2012).
-"""
+"""Photon counts of the elemental images, as sparse events or as a dense stack, and their frames."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
+from pcii.base.short_form import times
 from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
 from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid
-
-MOST_FRAMES = 1 << 24
-"""At 100 000 frames a second, three minutes."""
-MOST_BITS = 32
-NEGLIGIBLE_LOSS = 0.02
-"""Share of photons lost to saturation up to which a model of Poisson counts holds well: contrasts and the
-variance of counts are each too small by this share, less than the noise of either (docs/single_photon.md)."""
-NEWTON_STEPS = 100
-"""A mean within 1e-12 of the limit of 2 to 32 bits takes 36 at most."""
-
-
-@dataclass(frozen=True, repr=False)
-class PhotonEvents(ShortForm):
-    """Pixels with photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,) of integers."""
-
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    n: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"events": self.n.size, "photons": int(self.n.sum())}
-
-
-@dataclass(frozen=True, repr=False)
-class FrameEvents:
-    """Single counts: camera (k, l), pixel (i, j) and `frame`, from 0; five arrays (N,) of integers."""
-
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    frame: np.ndarray
-
-
-@dataclass(frozen=True)
-class Readout:
-    """An exposure of equal `frames`, in each of which a pixel stops at 2^`bits` - 1 counts.
-
-    Without `bits` it does not stop. Raises `InputError` for a number of frames or bits that cannot be.
-    """
-
-    frames: int = 1
-    bits: int | None = None
-
-    def __post_init__(self) -> None:
-        for name, value, most in (("frames", self.frames, MOST_FRAMES), ("bits", self.bits, MOST_BITS)):
-            if name == "bits" and value is None:
-                continue
-            if not is_whole(value) or not 1 <= value <= most:
-                raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
-            object.__setattr__(self, name, int(value))
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether nothing but the photons decides the counts: one frame, and no limit."""
-        return self.frames == 1 and self.bits is None
-
-    @property
-    def most_per_frame(self) -> int | None:
-        """Counts at which a pixel stops in each frame, None for no limit."""
-        return None if self.bits is None else (1 << self.bits) - 1
-
-    def check(self, n: np.ndarray) -> None:
-        """Raise `InputError` for counts of a pixel that its frames cannot hold."""
-        most, largest = self.most_per_frame, int(n.max(initial=0))
-        if most is not None and largest > most * self.frames:
-            raise InputError(
-                f"n: a pixel has {largest} counts, where frames = {self.frames}, bits = {self.bits} hold "
-                f"{most * self.frames} at most"
-            )
-
-    def photons(self, counts: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Photons per pixel and exposure where `samples` pixels have `counts` in all, float64.
-
-        Both are whole numbers of one shape. Without a limit it is the mean, counts / samples; of one bit the
-        maximum-likelihood estimate -T ln(1 - N / (V T)) of N set bits in V samples; of more bits the mean of
-        Poisson numbers whose mean after they are clipped is that of the counts. Infinite where all frames are
-        full, 0 without samples.
-        """
-        mean = np.zeros(counts.shape, dtype=np.float64)
-        np.divide(counts, samples, out=mean, where=samples > 0)
-        most = self.most_per_frame
-        if most is None:
-            return mean
-        lit = (counts > 0) & (samples > 0)
-        number, trials = counts[lit].astype(np.float64), samples[lit].astype(np.float64) * self.frames
-        rate = _rate_of_bits(number, trials) if most == 1 else _rate(number / trials, most)
-        mean[lit] = self.frames * rate
-        return mean
-
-
-PLAIN = Readout()
-"""One frame without a limit."""
+from pcii.types.photon_events import (
+    FrameEvents,
+    PhotonEvents,
+    checked_pixels,
+    events_of,
+    sorted_events,
+    sorted_frames,
+)
+from pcii.types.readout import PLAIN, Readout
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,8 +65,8 @@ class PhotonCounts(Plottable):
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         readout = Readout(frames, bits)
         readout.check(counts)
-        own = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
-        return cls(grid, cfa, _dense=read_only(own), readout=readout)
+        copy = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
+        return cls(grid, cfa, _dense=read_only(copy), readout=readout)
 
     @classmethod
     def from_events(
@@ -274,8 +180,8 @@ class PhotonCounts(Plottable):
         events = self.events
         image = np.zeros(self.grid.shape_HW, dtype=np.int64)
         number = k * self.grid.cols + l
-        of_view = slice(self.view_starts[number], self.view_starts[number + 1])
-        image[events.i[of_view], events.j[of_view]] = events.n[of_view]
+        view_events = slice(self.view_starts[number], self.view_starts[number + 1])
+        image[events.i[view_events], events.j[view_events]] = events.n[view_events]
         return image
 
     def rate(self, k: int, l: int, frames: tuple[int, int] | None = None) -> np.ndarray:
@@ -354,94 +260,3 @@ def _checked_range(frames: object, number: int) -> tuple[int, int]:
         case (first, end) if is_whole(first) and is_whole(end) and 0 <= first < end <= number:
             return first, end
     raise InputError(f"frames: expected (first, end) with 0 <= first < end <= {number}, got {frames!r}")
-
-
-def _rate_of_bits(number: np.ndarray, trials: np.ndarray) -> np.ndarray:
-    """-ln(1 - number / trials); where most bits are set the difference is taken first, in whole numbers."""
-    few = number <= trials / 2
-    with np.errstate(divide="ignore"):
-        return np.where(few, -np.log1p(-number / trials), np.log(trials) - np.log(trials - number))
-
-
-def clipped_mean(rate: np.ndarray, most: int) -> np.ndarray:
-    """Mean of Poisson numbers of these rates, clipped at `most`: mu P(X < most) + most P(X > most)."""
-    from scipy.special import pdtr, pdtrc
-
-    return rate * pdtr(most - 1, rate) + most * pdtrc(most, rate)
-
-
-def _rate(mean: np.ndarray, most: int) -> np.ndarray:
-    """The mean mu of Poisson numbers that have this `mean` when they are clipped at `most`.
-
-    `clipped_mean` is concave and has the slope P(X < most), so Newton's steps from the mean, which is never
-    above mu, approach it from one side.
-    """
-    from scipy.special import pdtr
-
-    rate = np.where(mean < most, mean, np.inf)
-    open_ = np.isfinite(rate)
-    for _ in range(NEWTON_STEPS):
-        mu = rate[open_]
-        step = np.maximum(mean[open_] - clipped_mean(mu, most), 0) / pdtr(most - 1, mu)
-        rate[open_] = mu + step
-        open_[open_] = step > 1e-15 * mu
-        if not open_.any():
-            break
-    return rate
-
-
-def checked_pixels(columns: Mapping[str, np.ndarray], grid: CameraGrid) -> tuple[np.ndarray, ...]:
-    """Lists k, l, i, j of cameras and pixels as int32; `InputError` for an index outside the grid."""
-    pixels = []
-    for (name, values), limit in zip(columns.items(), grid.shape_KLHW, strict=True):
-        column = whole_counts(name, np.atleast_1d(values))
-        if column.ndim != 1:
-            raise InputError(f"{name}: expected a one-dimensional list")
-        if column.size and column.max() >= limit:
-            raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
-        pixels.append(column.astype(np.int32))
-    return tuple(pixels)
-
-
-def events_of(pixels: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
-    """Events of pixels (k, l, i, j) that are sorted, one event each."""
-    k, l, i, j = (read_only(index.astype(np.int32, copy=False)) for index in pixels)
-    return PhotonEvents(k, l, i, j, read_only(n))
-
-
-def sorted_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
-    """Events sorted by (k, l, i, j), one per pixel, without zeros: equal counts have equal events."""
-    flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
-    if n.all() and (np.diff(flat) > 0).all():  # as files and parts of other counts have them
-        return events_of(pixels, n)
-    occupied, inverse = np.unique(flat, return_inverse=True)
-    photons = np.zeros(occupied.size, dtype=np.int64)
-    np.add.at(photons, inverse, n)
-    occupied, photons = occupied[photons > 0], photons[photons > 0]
-    return events_of(np.unravel_index(occupied, grid.shape_KLHW), photons)
-
-
-def sorted_frames(
-    pixels: tuple[np.ndarray, ...], n: np.ndarray, frame: np.ndarray, grid: CameraGrid, readout: Readout
-) -> np.ndarray:
-    """Frame of each count of pixels that have `n`, in the order of their `sorted_events`, (sum n,) int32.
-
-    Frames of a pixel are in their order. Raises `InputError` for a list of another length, a frame outside
-    the exposure, and more counts in one than it holds.
-    """
-    if frame.shape != (int(n.sum()),):
-        raise InputError(f"frame: expected one for each of {int(n.sum())} counts, got {frame.shape}")
-    if frame.size and frame.max() >= readout.frames:
-        raise InputError(f"frame: {frame.max()} is outside 0 .. {readout.frames - 1}")
-    flat = np.ravel_multi_index(pixels, grid.shape_KLHW).repeat(n)
-    frame = frame.astype(np.int32)
-    step = np.diff(flat)
-    if not ((step > 0) | (step == 0) & (np.diff(frame) >= 0)).all():
-        order = np.lexsort((frame, flat))
-        flat, frame = flat[order], frame[order]
-    most = readout.most_per_frame
-    if most is not None and most < frame.size:
-        again = (flat[most:] == flat[:-most]) & (frame[most:] == frame[:-most])
-        if again.any():
-            raise InputError(f"frame: a pixel has more counts in frame {frame[most:][again][0]} than {most}")
-    return read_only(frame)

@@ -107,13 +107,14 @@ def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.nd
         raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
     assert light.photons is not None  # of a scope that is normalised
     # The energy of the scope of each pixel, or of all.
-    own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
+    height, width = raw.shape
+    energy = energies[colour_index(height, width, cfa)] if light.scope == "channel" else energies[0]
     with np.errstate(over="ignore"):
-        share = np.divide(light.photons, own, out=np.zeros_like(own), where=own > 0)
+        share = np.divide(light.photons, energy, out=np.zeros_like(energy), where=energy > 0)
     if np.isfinite(share).all():
         return raw * share
     # Of very faint light the pixel's part is taken first.
-    return light.photons * np.divide(raw, own, out=np.zeros(raw.shape), where=own > 0)
+    return light.photons * np.divide(raw, energy, out=np.zeros(raw.shape), where=energy > 0)
 
 
 def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = None) -> PhotonCounts:

@@ -13,7 +13,7 @@ from pcii.types.arrays import Plottable, read_only
 from pcii.types.bayer import by_colour, check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PLAIN, Readout
+from pcii.types.readout import PLAIN, Readout
 
 Shifts = Literal["nearest", "even"]
 

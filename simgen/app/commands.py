@@ -9,7 +9,7 @@ from pcii.base import command_line
 from pcii.base.command_line import answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Stages
-from pcii.exchange.export_command import export
+from pcii.exchange.export_formats import export
 from pcii.store.collection import Half
 from simgen.app.scene_commands import (
     Json,
@@ -224,9 +224,9 @@ def verify(dataset: Path, *, json: Json = False) -> None:
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
     """
-    from pcii.store.verification import verify_and_tell
+    from pcii.store.verification import print_verification
 
-    verify_and_tell(dataset, as_json=json)
+    print_verification(dataset, as_json=json)
 
 
 def main() -> int:

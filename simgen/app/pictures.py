@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pcii.base.blocks import evenly_chosen
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import block_px, exposed, to_srgb8, white_level
-from pcii.imaging.blocks import evenly_chosen
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import COUNTS
 from pcii.types.bayer import colours_and_samples

@@ -11,7 +11,7 @@ from pcii.base.errors import InputError
 from pcii.base.safe_files import locked
 from pcii.store import software
 from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
-from pcii.store.folders import check_file
+from pcii.store.folders import check_size, read_listed
 from pcii.store.manifests import DatasetManifest
 from pcii.store.software import PACKAGE
 
@@ -52,8 +52,9 @@ def read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
     manifest = read_written_manifest(out)
     if manifest.identity != identity:
         raise other_dataset(out, "dataset", manifest.versions)
+    check = read_listed if content else check_size
     for name, entry in manifest.files.items():
-        check_file(out, name, entry, content=content)
+        check(out, name, entry)
     return manifest
 
 

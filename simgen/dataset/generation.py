@@ -12,18 +12,19 @@ from typing import Any, TypeVar
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors, new_folder_safely, sweep_temporaries
 from pcii.store.dataset_layout import (
+    ARRAYS,
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
     nested_name,
+    pack_arrays,
     read_written_manifest,
     write_manifest,
 )
 from pcii.store.folders import list_files
 from pcii.store.manifests import DatasetManifest
-from pcii.store.packed_arrays import ARRAYS, pack_arrays
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base.errors import InputError
 from pcii.store.dataset_card import Terms
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import MOST_BITS, MOST_FRAMES, Readout
+from pcii.types.readout import MOST_BITS, MOST_FRAMES, Readout
 from simgen.base.file_lookup import find, find_all
 from simgen.base.strict_models import (
     LARGEST_MM,

@@ -8,7 +8,7 @@ docs/experiments/three_step.md compares this with grey levels and with the photo
 
 import numpy as np
 
-from pcii.imaging.watershed_pieces import cheapest_planes
+from pcii.removal.three_step.watershed_pieces import cheapest_planes
 
 BORDER_BITS = 0.1
 """Least gain in entropy, in bits per window of border, for which neighbouring regions get different

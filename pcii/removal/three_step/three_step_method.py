@@ -15,16 +15,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.imaging.bright_regions import (
+from pcii.removal.three_step.bright_regions import (
     EDGE_SMOOTHING_PX,
     SMALLEST_REGION_PX,
     brightness,
     outlined,
     roberts_magnitude,
 )
-from pcii.imaging.watershed_pieces import pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.variance_threshold import adaptive_threshold, cell_px_for, tolerance_px
+from pcii.removal.three_step.watershed_pieces import pieces_along_ridges
 from pcii.sections.photon_statistics import (
     pooled_plane,
     section_window_px,

@@ -5,8 +5,8 @@ The paper gives no T; here it is derived from the Poisson law. docs/theory.md ha
 
 import numpy as np
 
-from pcii.imaging.blocks import on_pixels
-from pcii.imaging.bright_regions import large_pieces, roberts_magnitude
+from pcii.base.blocks import on_pixels
+from pcii.removal.three_step.bright_regions import large_pieces, roberts_magnitude
 from pcii.sections.photon_statistics import (
     ViewSamples,
     photons_around_a_photon,

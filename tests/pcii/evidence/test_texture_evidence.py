@@ -7,8 +7,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from twins import even_light, unit_grid
 
+from pcii.base import block_sums
 from pcii.evidence import TextureModel, evidence_of_texture
-from pcii.imaging import block_sums
 from pcii.sections import reconstruct
 from pcii.types import FocalPlanes
 

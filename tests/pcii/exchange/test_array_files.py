@@ -60,6 +60,9 @@ def test_files_of_several_arrays(tmp_path: Path, name: str) -> None:
         pcii.import_arrays(path, OPTICS, axes="HWKL")
     with pytest.raises(InputError, match="and no lf; correct --key"):
         pcii.import_arrays(path, OPTICS, axes="HWKL", key="lf")
+    if name == "a.npz":
+        WRITERS[name](path, {"LF": HWKL, "notes": np.array({"lens": "f/2"}, dtype=object)})
+        np.testing.assert_array_equal(pcii.import_arrays(path, OPTICS, axes="HWKL").radiance, views.radiance)
 
 
 def test_a_folder_of_an_array_for_each_view(tmp_path: Path) -> None:
@@ -74,12 +77,17 @@ def test_a_folder_of_an_array_for_each_view(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("a.npy", b"version https://git-lfs.github.com/spec/v1\noid", "is a pointer of Git LFS"),
+        ("a.fits", b"SIMPLE  =                    T", "is a FITS file, which is not read"),
         ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(99), "nor in a .npz, .mat or HDF5 file"),
+        ("colmap/cameras.bin", b"", "is a model of COLMAP"),
     ],
 )
 def test_other_files_are_named(tmp_path: Path, capsys: Any, name: str, content: bytes, words: str) -> None:
-    (tmp_path / name).write_bytes(content)
-    check_refused(tmp_path / name, tmp_path / "out", CAMERAS, words, capsys)
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
+    source = path if path.parent == tmp_path else path.parent
+    check_refused(source, tmp_path / "out", CAMERAS, words, capsys)
 
 
 def write_depth(path: Path, z_mm: np.ndarray) -> None:
@@ -118,8 +126,20 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     said = capsys.readouterr().out
     assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in said
     assert "24 of 480 pixels have no known depth there, and count in no score" in said
-    truth = pcii.open_dataset(tmp_path / "out").truth
+    dataset = pcii.open_dataset(tmp_path / "out")
+    truth = dataset.truth
     assert truth is not None
+    assert dataset.views is not None
+    planes = pcii.FocalPlanes.at_depths(grid, [45, 90])
+    masks = pcii.TrueFocus(planes, truth).by_pixel
+    focus = pcii.Segmented(
+        masks, "by hand", pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
+    )
+    by_object, by_pixel = (
+        [row["iou"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
+        for kind in ("object", "pixel")
+    )
+    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))
     errors = depth_errors(grid, answer, truth)
@@ -134,6 +154,7 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         (np.ones((20, 23)), [], r"is \(20, 23\), and views are \(20, 24\)"),
         (np.zeros((20, 24)), [], "has no known depth"),
         (np.full((20, 24), 0.04), [], "has 0.04 mm, where depths are .* correct --depth-unit-mm"),
+        (np.full((20, 24), 0.04), ["--depth-key", "z"], "--depth-key is for .npz"),
         (None, ["--depth-along-ray"], "are for a file of --depth"),
     ],
 )
@@ -143,3 +164,23 @@ def test_depths_that_cannot_be(tmp_path: Path, capsys: Any, z: Any, options: lis
         np.save(tmp_path / "z.npy", z)
         options = [*options, "--depth", str(tmp_path / "z.npy")]
     check_refused(tmp_path / "views.npy", tmp_path / "out", [*CAMERAS, *options], words, capsys)
+
+
+def test_depths_in_metres_are_named(tmp_path: Path, capsys: Any) -> None:
+    np.save(tmp_path / "views.npy", VIEWS_KLHW)
+    np.save(tmp_path / "z.npy", np.full((20, 24), 0.6))
+    assert (
+        run("import", tmp_path / "views.npy", "-o", tmp_path / "out", *CAMERAS, "--depth", tmp_path / "z.npy")
+        == 0
+    )
+    assert "warning: z.npy has depths of 0.6 to 0.6 mm, nearer than the focal" in capsys.readouterr().out
+
+
+def test_a_picture_in_colours_is_no_map_of_depth(tmp_path: Path, capsys: Any) -> None:
+    np.save(tmp_path / "views.npy", VIEWS_KLHW)
+    planes = {
+        name: np.full((20, 24), value, np.float32) for name, value in zip("RGB", (1, 2, 3), strict=True)
+    }
+    OpenEXR.File({}, planes).write(str(tmp_path / "photo.exr"))
+    options = [*CAMERAS, "--depth", tmp_path / "photo.exr"]
+    check_refused(tmp_path / "views.npy", tmp_path / "out", options, "has colours or several pages", capsys)

@@ -14,6 +14,7 @@ from PIL import Image
 
 import pcii
 from pcii import FrameFormat, InputError, import_counts
+from pcii.exchange.frame_formats import SURE_NATS, expected_above_one
 from pcii.types import mosaic
 
 CAMERAS = ["--pitch-mm", 2, 2, "--focal-mm", 35, "--pixel-mm", 0.45]
@@ -24,7 +25,7 @@ BITS = RNG.random((2, 2, FRAMES, H, W)) < 0.3
 
 def told_of(source: Any, **options: Any) -> tuple[pcii.PhotonCounts, list[str]]:
     told: list[str] = []
-    return import_counts(source, OPTICS, tell=told.append, **options), told
+    return import_counts(source, OPTICS, note=told.append, **options), told
 
 
 def test_frames_of_0_and_1_are_frames_of_one_bit() -> None:
@@ -43,7 +44,15 @@ def test_frames_of_0_and_1_are_frames_of_one_bit() -> None:
     assert (told, counts.readout.bits) == ([], None)
 
 
-@pytest.mark.parametrize("bits", [2, 12])
+def test_numbers_above_one_that_light_would_give() -> None:
+    light = np.random.default_rng(1).poisson(0.1, 1_000_000)
+    expected = expected_above_one(int((light > 0).sum()), light.size)
+    assert expected == pytest.approx((light > 1).sum(), rel=0.05)
+    assert expected_above_one(10, 10) == 10
+    assert expected_above_one(0, 10) == 0 < SURE_NATS
+
+
+@pytest.mark.parametrize("bits", [2, 4, 12])
 def test_frames_of_a_few_bits_saturate(bits: int) -> None:
     most = 2**bits - 1
     stored = np.minimum(RNG.poisson(0.95 * most, (2, 2, FRAMES, H, W)), most).astype(np.uint16)
@@ -90,7 +99,7 @@ def test_hot_pixels_are_counted(tmp_path: Path, capsys: Any) -> None:
 
 
 def test_bits_of_noise_are_in_no_order() -> None:
-    for seed in range(10):
+    for seed in range(20):
         bits = np.random.default_rng(seed).random((2, 2, 20, 16, 64)) < 0.2
         assert told_of(np.packbits(bits, axis=4), stored=FrameFormat(bitpack=True))[1] == []
 
@@ -192,7 +201,12 @@ def test_marks_are_named_and_a_mask_leaves_them_out(tmp_path: Path) -> None:
 def test_numbers_that_are_stored_otherwise_are_named() -> None:
     counts = np.random.default_rng(9).poisson(3.0, (2, 2, 3, 40, 50)).astype(np.uint16)
     for stored, bits, words in (
-        (counts.byteswap(), 12, "multiples of 256; .*; if the bytes of each number are in the other order"),
+        (
+            counts.byteswap(),
+            12,
+            "multiples of 256; .*; if the bytes of each number are in the other order, swap",
+        ),
+        (counts.clip(max=15) << 4, 8, "multiples of 16; if that is one photon, give --gain 16$"),
         (counts.clip(max=1) * 255, None, "multiples of 255; if that is one photon, give --gain 255$"),
         (counts.clip(max=3), None, "of the numbers of array are 3, more than are 2: .* give --bits 2$"),
     ):
@@ -201,7 +215,7 @@ def test_numbers_that_are_stored_otherwise_are_named() -> None:
     assert told_of(counts.clip(max=3), stored=FrameFormat(bits=2))[1] == []
 
 
-@pytest.mark.parametrize("mean", [0.01, 3, 1000])
+@pytest.mark.parametrize("mean", [0.01, 0.3, 3, 40, 1000])
 def test_photon_counts_of_any_light_are_not_warned_of(mean: float) -> None:
     x = np.linspace(0, 6, 64)
     for texture in (np.ones(64), 1 + 0.9 * np.sin(x)):
@@ -211,9 +225,13 @@ def test_photon_counts_of_any_light_are_not_warned_of(mean: float) -> None:
 
 REFUSED = [
     ({"width": 8}, "--width: is for packed frames; give --bitpack too"),
+    ({"bit_order": "little"}, "--bit-order: is for packed frames"),
     ({"skip_bytes": (1, 0)}, "--skip-bytes: is for files without a header; give --frame-size too"),
     ({"bits": 17}, "--bits: expected 1 to 16, got 17"),
+    ({"bits": 2, "bitpack": True}, "--bits: expected 1 of packed frames, got 2"),
+    ({"gain": 0.0}, "--gain: expected a number above 0, got 0"),
     ({"offset": 3.0, "bitpack": True}, "--offset, --gain: are for numbers"),
+    ({"frame_size": (0, 4)}, "--frame-size, --skip-bytes: expected at least one pixel"),
 ]
 
 
@@ -223,7 +241,7 @@ def test_formats_that_cannot_be_are_refused(options: dict[str, Any], words: str)
         import_counts(BITS, OPTICS, stored=FrameFormat(**options))
 
 
-@pytest.mark.parametrize("axes", ["LKWH", "HWN"])
+@pytest.mark.parametrize("axes", ["HWKL", "LKWH", "HWN", "NHW"])
 def test_the_axes_of_an_array_are_named(tmp_path: Path, axes: str) -> None:
     counts = np.random.default_rng(3).poisson(2.0, (2, 3, H, W))
     named = {"K": 0, "L": 1, "H": 2, "W": 3}
@@ -266,7 +284,13 @@ def test_frames_and_colours_have_axes_of_their_own() -> None:
     ("shape", "axes", "words"),
     [
         ((40, 48, 5, 5), None, "would be more views than each has numbers; name the order .* such as HWKL"),
+        (
+            (40, 48, 5, 3, 3),
+            None,
+            "would be more views than each has numbers; name the order .* such as HWKL",
+        ),
         ((40, 48, 3, 3), "HWK", "--axes: expected each axis once, K and L"),
+        ((40, 48, 3, 3), "HWKK", "--axes: expected each axis once"),
         ((40, 48, 3), "HWKL", r"has the shape \(40, 48, 3\), and --axes HWKL are 4 axes"),
     ],
 )

@@ -1,5 +1,6 @@
 """Pictures become radiance: formats and bits, curves, which file is which view."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image, ImageCms
 
-from pcii import import_images
+from pcii import InputError, import_arrays, import_images
+from pcii.base import srgb_to_linear
 
 PATTERN = "{col}_{row}.%s"
 
@@ -88,9 +90,11 @@ def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) ->
     [
         (lambda k, l: f"{l}_{k}.png", "{col}_{row}.png", None),
         (lambda k, l: f"input_Cam{3 * k + l:03d}.png", "input_Cam{index:03d}.png", (2, 3)),
+        (lambda k, l: f"{3 * k + l + 998}.png", "{index}.png", (2, 3)),
         (lambda k, l: f"row {k}/[{l}].png", "row {row}/[{col}].png", None),
         (lambda k, l: f"view_{k - 1}_{l - 1:+d}.png", "view_{row}_{col}.png", None),
         (lambda k, l: f"out_{k:02d}_{l:02d}_{7.5 * l}_-{k}.25_.png", "out_{row}_{col}_*.png", None),
+        (lambda k, l: f"{l}_{k}.{'PNG' if l else 'png'}", "{col}_{row}.png", None),
     ],
 )
 def test_names_say_which_view_it_is(tmp_path: Path, names, pattern, grid) -> None:
@@ -122,12 +126,29 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
         file.write(str(tmp_path / "0_0.exr"))
     with pytest.warns(UserWarning, match=r"not used: the channels Z and the chromaticities in 0_0\.exr"):
         import_images(tmp_path, PATTERN % "exr", OPTICS)
-    first = Image.fromarray(numbers(0, 0))
+    (tmp_path / "0_0.exr").unlink()
+    first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
+    first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
+    with pytest.warns(UserWarning, match=r"not used: 1 more pictures in 0_0\.jpg"):
+        views = import_images(tmp_path, PATTERN % "jpg", OPTICS, note=warnings.warn)
+    np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
     spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
     for name, profile in spaces:
         content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes()
         first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
     told: list[str] = []
     for profile in ("srgb", "other"):
-        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
-    assert [one for one in told if "profile" in one] == ["not used: the colour profile in 0_0.other.png"]
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=told.append)
+    linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
+    first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
+    import_images(tmp_path, "{col}_{row}.gimp.png", OPTICS, note=told.append)
+    named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
+    assert [one for one in told if "profile" in one] == named
+    raw = np.full((H, W), 500, np.uint16)
+    tags = [(33422, "B", 4, b"\x02\x01\x01\x00", False), (50714, "H", 1, 256, False)]
+    tifffile.imwrite(tmp_path / "0_0.tif", raw, extratags=tags)
+    import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=told.append)
+    assert told[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
+    np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
+    with pytest.raises(InputError, match="holds numbers up to 255; encoded light is 1 at white"):
+        import_arrays(tmp_path / "0_0.npy", OPTICS, encoding="srgb")

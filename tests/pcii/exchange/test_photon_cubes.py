@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from command_runs import check_refused, run
-from photon_cubes import bits_of, packed, write_cubes
+from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
 from pcii import CameraGrid, FrameFormat, InputError, ViewOrder, import_counts, open_dataset
+from pcii.exchange import count_arrays
 from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
@@ -32,7 +33,7 @@ def files_of(folder: Path, bits: np.ndarray) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("shape", "share"), [((2, 3, 5), 0.0), ((300, 2, 33), 0.5)])
+@pytest.mark.parametrize(("shape", "share"), [((1, 1, 1), 1.0), ((2, 3, 5), 0.0), ((300, 2, 33), 0.5)])
 def test_sums_and_frames_are_those_of_unpacked_bits(shape: tuple[int, int, int], share: float) -> None:
     bits = np.random.default_rng(3).random((1, 1, *shape)) < share
     check_counts(counts_of_bits(bits, (0, shape[0])), bits)
@@ -42,7 +43,7 @@ def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
     """Counts of packed frames in memory."""
     frames, width = (span[0], span[1] - 1), bits.shape[4]
     stored = FrameFormat(bitpack=True, width=width)
-    return import_counts(packed(bits), OPTICS, frames=frames, stored=stored, tell=[].append)
+    return import_counts(packed(bits), OPTICS, frames=frames, stored=stored, note=[].append)
 
 
 def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
@@ -54,12 +55,17 @@ def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
     np.testing.assert_array_equal(listed, np.argwhere(bits.transpose(0, 1, 3, 4, 2)))
 
 
-def test_of_too_many_counts_to_keep_there_are_sums_alone(monkeypatch) -> None:
-    monkeypatch.setattr("pcii.exchange.count_arrays.MOST_KEPT", 100)
-    monkeypatch.setattr("pcii.exchange.count_arrays.PIECE_BYTES", 1)  # one frame after the other
-    counts = counts_of_bits(BITS, (2, 6))
-    np.testing.assert_array_equal(counts.dense, BITS[:, :, 2:6].sum(axis=2))
-    assert counts.frame is None
+@pytest.mark.parametrize("most_kept", [1 << 24, 100])
+@pytest.mark.parametrize(("piece_bytes", "span"), [(1 << 23, (0, FRAMES)), (1, (2, 6))])
+def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes, span) -> None:
+    monkeypatch.setattr(count_arrays, "MOST_KEPT", most_kept)
+    monkeypatch.setattr(count_arrays, "PIECE_BYTES", piece_bytes)
+    counts, seen = counts_of_bits(BITS, span), BITS[:, :, span[0] : span[1]]
+    if seen.sum() <= most_kept:
+        check_counts(counts, seen)
+    else:
+        np.testing.assert_array_equal(counts.dense, seen.sum(axis=2))
+        assert counts.frame is None
 
 
 @pytest.mark.parametrize(("grid", "cfa"), [(GRID, "GRBG"), (EIGHTS, None)])
@@ -85,7 +91,7 @@ def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kept", ["files", "one file", "counted file"])
 def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     pattern, source = None, tmp_path / "all.npy"
-    options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "tell": [].append}
+    options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "note": [].append}
     if kept == "files":
         pattern, source = "{row}_{col}.npy", files_of(tmp_path / "views", BITS)
     elif kept == "one file":
@@ -99,24 +105,26 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     check_counts(counts, BITS[::-1, :, 1:8])
 
 
-def test_packed_bits_that_are_read_as_counts_are_warned_of() -> None:
+@pytest.mark.parametrize("share", [0.01, 0.3])
+def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
     rng, told = np.random.default_rng(1), []
-    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < 0.3), OPTICS, tell=told.append)
-    assert [sentence.split(";")[0] for sentence in told] == [
-        "warning: array looks like bits packed eight to a byte"
+    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=told.append)
+    assert told == [
+        "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
     ]
-    import_counts(rng.poisson(6, (1, 2, 40, 16, 64)).astype(np.uint8), OPTICS, tell=told.append)
+    counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
+    import_counts(counts, OPTICS, note=told.append)
     assert len(told) == 1
 
 
 @pytest.mark.parametrize(
     ("lit", "width", "advice"),
-    [(61, None, "import again with --width 61"), (50, 64, "cut them off the frames"), (61, 61, None)],
-)
+    [(61, 64, "import again with --width 61"), (61, None, "import again with --width 61"), (50, 64, "cut them off the frames"), (61, 61, None)],
+)  # fmt: skip
 def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
     bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
-    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), tell=told.append)
+    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=told.append)
     words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
     assert told == ([] if advice is None else [words])
 
@@ -138,7 +146,10 @@ FILES = ["--bitpack", "--pattern", "{row}_{col}/frames.npy", *CAMERAS]
 WRONG: list[tuple[Callable[[Path], Path], list[Any], str]] = [
     (cubes(), [*FILES, "--frames", 3, 9], r"has the frames 0 to 8; .* got 3 and 9"),
     (cubes(), [*FILES, "--width", 10], "bits beyond the 10 pixels of a row are set"),
+    (cubes(), ["--counts", *FILES[1:], "--width", 13], "--width: is for packed frames"),
     (cubes(bitpack_dim=1), [], "bitpack_dim: expected 2, the width, got 1"),
+    (cubes(w=30, cx=15), [], "rows are of 9 to 16 pixels, and the stated width is 30"),
+    (cubes(cfa="RGGB"), ["--cfa", "GRBG"], "cfa: is RGGB; leave out --cfa"),
     (cubes("00_01", frames=POSES), [], "the camera moves, and a moving camera is no grid"),
 ]
 

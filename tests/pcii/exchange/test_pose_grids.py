@@ -77,7 +77,7 @@ def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
 def test_one_length_tells_the_others(tmp_path: Path, film, focal_mm, pixel_mm) -> None:
     file, told = read(tmp_path, frames_of(2, 3), cx=330, cy=238), []
     lengths = {"focal_mm": None, "pixel_mm": None, "sensor_mm": None} | film
-    grid = camera_grid_of(file, find_grid(file), **lengths, tell=told.append)
+    grid = camera_grid_of(file, find_grid(file), **lengths, note=told.append)
     assert (grid.focal_mm, grid.pixel_mm) == (focal_mm, pixel_mm)
     assert (grid.pitch_mm, grid.shape_KLHW) == ((5, 4), (2, 3, 480, 640))
     assert "10 px to the right of their middle and -2 px below" in told[-1]

@@ -52,7 +52,7 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
     path.write_text(path.read_text(), "utf-16")
     told: list[str] = []
-    file = read_transforms(path, tell=told.append)
+    file = read_transforms(path, note=told.append)
     assert told == ["not used of transforms.json: aabb_scale, sharpness"]
     assert (file.height, file.width, file.focal_px) == (H, W, pytest.approx(50))
     assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]

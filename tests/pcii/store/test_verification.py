@@ -17,9 +17,9 @@ from pcii.store import (
     ROWS,
     index_row,
     list_files,
+    print_verification,
     read_manifest,
     verify,
-    verify_and_tell,
     write_index,
 )
 
@@ -95,5 +95,5 @@ def test_files_that_no_manifest_lists_are_named(tmp_path: Path) -> None:
 
 
 def test_results_of_other_software_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    verify_and_tell(make_results(tmp_path / "r", {"numpy": "0.1"}), as_json=False)
+    print_verification(make_results(tmp_path / "r", {"numpy": "0.1"}), as_json=False)
     assert "2 files match the manifest; other software made them: " in capsys.readouterr().out

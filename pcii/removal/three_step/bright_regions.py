@@ -1,7 +1,7 @@
 """Bright regions of a section, with outlines along the strongest edges; operations on masks.
 
-The gradient is that of Roberts' cross (Muniraj et al. 2017,
-Eq. 8), and the outline follows its ridges. Levels follow from the photon noise.
+The gradient is that of Roberts' cross (Muniraj et al. 2017, Eq. 8), and the outline follows its ridges.
+Levels follow from the photon noise.
 """
 
 import numpy as np
@@ -14,8 +14,6 @@ BLUR_SHARE = 1 / 3
 """A pixel below 1/3 of the brightest nearby (1/9 of its photons) may be part of the blur of that one."""
 EDGE_SMOOTHING_PX = 1.0
 SMALLEST_REGION_PX = 100
-MARGIN_PX = 40
-"""Margin around an object that is shown or searched, so that its outline may move."""
 
 
 def roberts_magnitude(image: np.ndarray) -> np.ndarray:
@@ -86,33 +84,12 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     return ~large_pieces(~large_pieces(mask, smallest_px), smallest_px)
 
 
-def box_around(mask: np.ndarray, margin_px: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:
-    """Rows and columns of a mask with margins (vertical, horizontal), inside the frame; all if it is empty.
-
-    >>> box_around(np.eye(9, dtype=bool)[:5], (1, 2))
-    (slice(0, 5, None), slice(0, 7, None))
-    """
-    if not mask.any():
-        return slice(0, mask.shape[0]), slice(0, mask.shape[1])
-    box = []
-    for axis, size in enumerate(mask.shape):
-        inside, margin = np.flatnonzero(mask.any(axis=1 - axis)), margin_px[axis]
-        box.append(slice(max(int(inside[0]) - margin, 0), min(int(inside[-1]) + 1 + margin, size)))
-    return box[0], box[1]
-
-
-def connected_pieces(mask: np.ndarray) -> np.ndarray:
-    """Number of the connected component (of four neighbours) of each pixel, from 1; 0 outside; int32."""
+def large_pieces(mask: np.ndarray, smallest_px: float) -> np.ndarray:
+    """The mask without connected components (of four neighbours) of fewer than `smallest_px` pixels."""
     from scipy.ndimage import label
 
     pieces = np.zeros(mask.shape, dtype=np.int32)
     label(mask, output=pieces)
-    return pieces
-
-
-def large_pieces(mask: np.ndarray, smallest_px: float) -> np.ndarray:
-    """The mask without connected components of fewer than `smallest_px` pixels."""
-    pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px
     keep[0] = False
     return keep[pieces]

@@ -1,8 +1,11 @@
-"""Square blocks of pixels: sums over them, and their values on pixels again; windows; some of many things."""
+"""Square blocks of pixels, windows and boxes: sums over them, and their values on pixels again."""
 
 from collections.abc import Sequence
 
 import numpy as np
+
+MARGIN_PX = 40
+"""Margin around an object that is shown, so that its outline may move."""
 
 
 def block_sums(pixels: np.ndarray, side: int, dtype: type, axes: tuple[int, int] = (-2, -1)) -> np.ndarray:
@@ -51,3 +54,18 @@ def evenly_chosen(count: int, most: int) -> list[int]:
     ([0, 1, 2], [0, 4, 8])
     """
     return np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist()
+
+
+def box_around(mask: np.ndarray, margin_px: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:
+    """Rows and columns of a mask with margins (vertical, horizontal), inside the frame; all if it is empty.
+
+    >>> box_around(np.eye(9, dtype=bool)[:5], (1, 2))
+    (slice(0, 5, None), slice(0, 7, None))
+    """
+    if not mask.any():
+        return slice(0, mask.shape[0]), slice(0, mask.shape[1])
+    box = []
+    for axis, size in enumerate(mask.shape):
+        inside, margin = np.flatnonzero(mask.any(axis=1 - axis)), margin_px[axis]
+        box.append(slice(max(int(inside[0]) - margin, 0), min(int(inside[-1]) + 1 + margin, size)))
+    return box[0], box[1]

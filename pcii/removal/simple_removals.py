@@ -2,13 +2,13 @@
 
 Each uses a single cue, in windows whose size follows from the number of photons. All work on the square root
 of the photons in a window, whose noise does not depend on the brightness (see
-`pcii.imaging.bright_regions.brightness`).
+`pcii.removal.three_step.bright_regions.brightness`).
 """
 
 import numpy as np
 
-from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
-from pcii.imaging.bright_regions import brightness as root_photons
+from pcii.removal.three_step.bright_regions import SMALLEST_REGION_PX, without_specks
+from pcii.removal.three_step.bright_regions import brightness as root_photons
 from pcii.sections.photon_statistics import pooled_estimate, section_window_px
 from pcii.sections.reconstruction import extend, with_probes
 from pcii.types.estimates import Segmented

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from twins import paper_grid
 
-from pcii.imaging import boundary_f, object_share
-from pcii.metrics import score
+from pcii.metrics import boundary_f, object_share, score
 from pcii.sections import reconstruct
 from pcii.types import PhotonCounts, Segmented, Truth
 

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.depth.depth_planes import peak_depth_mm
-from pcii.imaging.blocks import block_sums, on_pixels
+from pcii.base.blocks import block_sums, on_pixels
 from pcii.sections.demosaicing import demosaic
 from pcii.sections.dense_sections import in_memory
 from pcii.sections.reconstruction import reconstruct
@@ -145,9 +144,27 @@ def _swept(
             best[better] = plane
             last, least = current, np.minimum(least, current)
     # Where all planes are alike there is nothing to choose from.
-    depth = np.where(nearby[1] > least, peak_depth_mm(planes, best, nearby), np.nan)
+    depth = np.where(nearby[1] > least, _peak_depth_mm(planes, best, nearby), np.nan)
     depth = on_pixels(depth, side, data.grid.shape_HW)
     return DepthMap(depth, np.isfinite(depth).astype(np.float64))
+
+
+def _peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:
+    """Depth (h, w) in mm of the top of a parabola through the `best` plane (h, w) and its neighbours.
+
+    `nearby` (3, h, w) is a measure at the plane before, at it and after it: larger the better the plane, and
+    not finite beyond the ends. Total disparities of the planes are evenly spaced. The depth stays within half
+    a step of the best plane.
+    """
+    total_px = planes.total_disparity_px
+    before, at, after = nearby
+    inner = np.isfinite(nearby).all(axis=0)
+    with np.errstate(invalid="ignore"):
+        curvature = np.where(inner, before - 2 * at + after, 0.0)
+        slope = np.where(inner, before - after, 0.0)
+    offset = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
+    step_px = total_px[1] - total_px[0]
+    return depth_of_total_disparity_mm(planes.grid, total_px[best] + np.clip(offset, -0.5, 0.5) * step_px)
 
 
 def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:

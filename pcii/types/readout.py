@@ -1,0 +1,122 @@
+"""Frames of a single-photon camera, and the photons that their counts stand for.
+
+A single-photon camera divides the exposure into T equal frames. In each a pixel stops at m = 2^bits - 1
+counts; of one bit it shows whether there was a photon at all. With mu photons expected in a frame the number
+of frames with a photon is binomial, of T with the probability 1 - exp(-mu) (Fossum, "What to do with sub-
+diffraction-limit pixels? A proposal for a gigapixel digital film sensor", 2005; Yang et al., "Bits from
+photons", IEEE Trans. Image Process. 21, 2012).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.types.arrays import is_whole
+
+MOST_FRAMES = 1 << 24
+"""At 100 000 frames a second, three minutes."""
+
+MOST_BITS = 32
+
+NEGLIGIBLE_LOSS = 0.02
+"""Share of photons lost to saturation up to which a model of Poisson counts holds well: contrasts and the
+variance of counts are each too small by this share, less than the noise of either (docs/single_photon.md)."""
+
+NEWTON_STEPS = 100
+"""A mean within 1e-12 of the limit of 2 to 32 bits takes 36 at most."""
+
+
+@dataclass(frozen=True)
+class Readout:
+    """An exposure of equal `frames`, in each of which a pixel stops at 2^`bits` - 1 counts.
+
+    Without `bits` it does not stop. Raises `InputError` for a number of frames or bits that cannot be.
+    """
+
+    frames: int = 1
+    bits: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("frames", self.frames, MOST_FRAMES), ("bits", self.bits, MOST_BITS)):
+            if name == "bits" and value is None:
+                continue
+            if not is_whole(value) or not 1 <= value <= most:
+                raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
+            object.__setattr__(self, name, int(value))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but the photons decides the counts: one frame, and no limit."""
+        return self.frames == 1 and self.bits is None
+
+    @property
+    def most_per_frame(self) -> int | None:
+        """Counts at which a pixel stops in each frame, None for no limit."""
+        return None if self.bits is None else (1 << self.bits) - 1
+
+    def check(self, n: np.ndarray) -> None:
+        """Raise `InputError` for counts of a pixel that its frames cannot hold."""
+        most, largest = self.most_per_frame, int(n.max(initial=0))
+        if most is not None and largest > most * self.frames:
+            raise InputError(
+                f"n: a pixel has {largest} counts, where frames = {self.frames}, bits = {self.bits} hold "
+                f"{most * self.frames} at most"
+            )
+
+    def photons(self, counts: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Photons per pixel and exposure where `samples` pixels have `counts` in all, float64.
+
+        Both are whole numbers of one shape. Without a limit it is the mean, counts / samples; of one bit the
+        maximum-likelihood estimate -T ln(1 - N / (V T)) of N set bits in V samples; of more bits the mean of
+        Poisson numbers whose mean after they are clipped is that of the counts. Infinite where all frames are
+        full, 0 without samples.
+        """
+        mean = np.zeros(counts.shape, dtype=np.float64)
+        np.divide(counts, samples, out=mean, where=samples > 0)
+        most = self.most_per_frame
+        if most is None:
+            return mean
+        lit = (counts > 0) & (samples > 0)
+        number, trials = counts[lit].astype(np.float64), samples[lit].astype(np.float64) * self.frames
+        rate = _rate_of_bits(number, trials) if most == 1 else _rate(number / trials, most)
+        mean[lit] = self.frames * rate
+        return mean
+
+
+PLAIN = Readout()
+"""One frame without a limit."""
+
+
+def _rate_of_bits(number: np.ndarray, trials: np.ndarray) -> np.ndarray:
+    """-ln(1 - number / trials); where most bits are set the difference is taken first, in whole numbers."""
+    few = number <= trials / 2
+    with np.errstate(divide="ignore"):
+        return np.where(few, -np.log1p(-number / trials), np.log(trials) - np.log(trials - number))
+
+
+def clipped_mean(rate: np.ndarray, most: int) -> np.ndarray:
+    """Mean of Poisson numbers of these rates, clipped at `most`: mu P(X < most) + most P(X > most)."""
+    from scipy.special import pdtr, pdtrc
+
+    return rate * pdtr(most - 1, rate) + most * pdtrc(most, rate)
+
+
+def _rate(mean: np.ndarray, most: int) -> np.ndarray:
+    """The mean mu of Poisson numbers that have this `mean` when they are clipped at `most`.
+
+    `clipped_mean` is concave and has the slope P(X < most), so Newton's steps from the mean, which is never
+    above mu, approach it from one side.
+    """
+    from scipy.special import pdtr
+
+    rate = np.where(mean < most, mean, np.inf)
+    open_ = np.isfinite(rate)
+    for _ in range(NEWTON_STEPS):
+        mu = rate[open_]
+        step = np.maximum(mean[open_] - clipped_mean(mu, most), 0) / pdtr(most - 1, mu)
+        rate[open_] = mu + step
+        open_[open_] = step > 1e-15 * mu
+        if not open_.any():
+            break
+    return rate
