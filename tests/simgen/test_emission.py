@@ -53,10 +53,15 @@ def test_a_card_that_shines_is_an_area_light() -> None:
 
 
 @pytest.mark.skipif(SCALAR, reason="takes minutes without a compiled backend")
-def test_photons_of_a_mesh_with_normals_follow_the_image(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["mesh with normals", "picture"])
+def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
     write_octahedron(tmp_path / "lamp.ply")
     mesh = {"type": "mesh", "file": "lamp.ply", "scale": [40.0, 40.0, -60.0]}
     thing = shining(mesh, {"illuminant": [1.0, 0.6, 0.3]})
+    if kind == "picture":
+        steps = np.arange(64, dtype=np.uint8).reshape(8, 8, 1) * np.array([1, 2, 4], np.uint8)
+        Image.fromarray(steps).save(tmp_path / "a.png")
+        thing = shining({"type": "card", "width_mm": 90.0, "height_mm": 50.0}, {"texture": "a.png"})
     # In sight, so that its own light is among what is counted.
     thing = thing | {"position_mm": (60.0, -120.0, 450.0)}
     built = made([WALL, thing], [], max_depth=3, folder=tmp_path)

@@ -12,12 +12,13 @@ from scipy.spatial.transform import Rotation
 from pcii.types import CameraGrid, mosaic
 from simgen.cameras import Cameras, Rig, as_rig, rig_of
 from simgen.photons import Setup, thin_photons
-from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.renderer import RenderScene, backend, build, film_rays, render_view
 from simgen.sensor import PhotonTable
 from simgen.spec import Lens, Photons, Recipe, Scene
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
 pytestmark = pytest.mark.renders
+COMPILED = backend.choose().kind != "scalar"
 GRID = CameraGrid(rows=3, cols=2, pitch_mm=(6.0, 4.0), focal_mm=50.0, pixel_mm=0.1408, height=81, width=90)
 SCALE_PX = 50.0 / 0.1408
 SIDE_MM = 8.0
@@ -114,6 +115,34 @@ def test_the_virtual_centre_is_a_perfect_pinhole() -> None:
     rig = rig_of(recipe(errors={"position_sd_mm": (1.0, 1.0, 1.0)}, lens=LENS.model_dump()).grid, 5)
     assert rig.lens == LENS
     assert rig.pinhole(0, 0).lens is None
+
+
+@pytest.mark.skipif(not COMPILED, reason="scalar mode has no rays by the thousand")
+@pytest.mark.parametrize("lens", [None, LENS])
+def test_rays_are_the_same_on_both_sides(lens: Lens | None) -> None:
+    rig = replace(off_places(replace(GRID, shear_px=(3.5, -2.0))), lens=lens)
+    scene, mi = dot((0.0, 0.0, 600.0)), backend.load()
+    rng = np.random.default_rng(2)
+    k, l = rng.integers(0, 3, 500), rng.integers(0, 2, 500)
+    row_px, col_px = rng.uniform(0, 80, 500), rng.uniform(0, 89, 500)
+    points = np.zeros((2, 500)) if lens is None else rig.lens_points(rng.random((2, 500)))
+    ray = film_rays(
+        scene,
+        rig,
+        mi.UInt32(k),
+        mi.UInt32(l),
+        mi.Float(row_px),
+        mi.Float(col_px),
+        None if lens is None else mi.Point2f(points),
+    )
+    origin, direction = rig.rays(k, l, row_px, col_px, points)
+    # Single precision: eight digits of film points up to 90 px, of places of some 10 mm.
+    np.testing.assert_allclose(np.array(ray.d).T, direction, atol=1e-6)
+    np.testing.assert_allclose(np.array(ray.o).T, origin, atol=1e-5)
+    if lens is not None:
+        radius = np.hypot(*points)
+        assert 0.97 * 10 < radius.max() < 10
+        assert stats.kstest((radius / 10) ** 2, "uniform").pvalue > 1e-3
 
 
 BLUR = {
