@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.sensor.detector import sensitivities
@@ -15,12 +15,12 @@ FIRST_NUMBER = 100
 """Numbers of drawn scenes from here on are for figures, those below for tuning."""
 
 
-def setup_of(recipe: Recipe) -> Setup:
-    """The recipe's scene and cameras."""
+def capture_of(recipe: Recipe) -> Capture:
+    """The recipe's scene as perfect cameras see it."""
     scene, folder = load_scene(recipe.scene)
     mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
     built = build(mi, scene, folder, recipe.render.max_depth, curves)
-    return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
+    return Capture(built, recipe.grid.camera_grid(), recipe.cfa, recipe.photons)
 
 
 def film(side_px: int) -> list[str]:

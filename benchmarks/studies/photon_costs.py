@@ -6,6 +6,7 @@ Dense views are timed on a few views and scaled to all, since each costs the sam
 import tempfile
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,12 @@ import numpy as np
 from benchmarks.figures import bars, curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import FIRST_NUMBER, KINDS, film, setup_of
+from benchmarks.scenes import FIRST_NUMBER, KINDS, capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side, timed
 from pcii.types.camera_grid import CameraGrid
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.photons.thinning import thin_photons
 from simgen.spec.recipe import Recipe, load_recipe
 
@@ -57,25 +58,26 @@ def measure(side_px: int, repeats: int, dense_views: int, most_photons: int, dra
 
 def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], list[Ratio]]:
     recipe, _ = load_recipe("paper", film(side_px))
-    setup, logs = setup_of(recipe), dict[str, dict[str, Any]]()
+    capture, logs = capture_of(recipe), dict[str, dict[str, Any]]()
 
-    def thinning(name: str, own: Recipe, own_setup: Setup, seed: int) -> None:
-        logs[name] = thin_photons(own_setup, own.photons, seed=seed)[1]
+    def thinning(name: str, own_capture: Capture, seed: int) -> None:
+        logs[name] = thin_photons(replace(own_capture, seed=seed))[1]
 
     def dense(samples: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
         for view in range(dense_views):
-            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, recipe.photons.budget, rng)
+            drawn_counts(
+                rendered_mosaic(capture, view, samples, seed), capture.cfa, recipe.photons.budget, rng
+            )
 
-    works: dict[str, Any] = {BASE: lambda n: thinning(BASE, recipe, setup, n)}
+    works: dict[str, Any] = {BASE: lambda n: thinning(BASE, capture, n)}
     for name, (finer, settings) in OTHERS.items():
-        own, _ = load_recipe("paper", [*film(finer * side_px), *settings])
-        own_setup = setup_of(own)
-        works[name] = lambda n, name=name, own=own, s=own_setup: thinning(name, own, s, n)
+        own_capture = capture_of(load_recipe("paper", [*film(finer * side_px), *settings])[0])
+        works[name] = lambda n, name=name, own=own_capture: thinning(name, own, n)
     for samples in (1, 16):
         works[f"{DENSE}, samples: {samples}"] = lambda n, samples=samples: dense(samples, n)
     seconds = side_by_side(works, repeats)
-    scale = setup.grid.view_count / dense_views
+    scale = capture.grid.view_count / dense_views
     rows: list[Row] = []
     for name, taken in seconds.items():
         values = {"time_ms": median_of(taken, 1e3 * (scale if name.startswith(DENSE) else 1))}
@@ -93,7 +95,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], lis
         )
         for samples in (1, 16)
     ]
-    return [*rows, *_costs(seconds, scale, setup.grid)], ratios
+    return [*rows, *_costs(seconds, scale, capture.grid)], ratios
 
 
 def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> list[Row]:
@@ -117,8 +119,8 @@ def _growth(side_px: int, repeats: int, most: int) -> list[Row]:
         recipe, _ = load_recipe(
             "paper", ["grid.rows=1", "grid.cols=2", *film(side_px), f"photons.budget={10**power}"]
         )
-        setup = setup_of(recipe)
-        taken, _ = timed(lambda n, s=setup, p=recipe.photons: thin_photons(s, p, seed=n), repeats)
+        capture = capture_of(recipe)
+        taken, _ = timed(lambda n, own=capture: thin_photons(replace(own, seed=n)), repeats)
         values = {
             "time_ms": median_of(taken, 1e3),
             "each_us": median_of(taken, 1e6 / (2 * 10**power)),
@@ -138,13 +140,11 @@ def _drawn(each: int, base_ms: float) -> list[Row]:
                 start = time.perf_counter()
                 generate(recipe, Path(), Path(folder) / f"{kind}_{number}")
                 fresh.append(time.perf_counter() - start)
-                grid, depth = recipe.grid.camera_grid(), recipe.render.max_depth
-                setup = Setup(prepare(recipe, Path()).render_scene(), grid, recipe.cfa, depth)
+                built, grid = prepare(recipe, Path()).render_scene(), recipe.grid.camera_grid()
+                capture = Capture(built, grid, recipe.cfa, recipe.photons)
                 logs: list[dict[str, Any]] = []
                 works = {
-                    kind: lambda n, s=setup, p=recipe.photons, logs=logs: logs.append(
-                        thin_photons(s, p, seed=n)[1]
-                    )
+                    kind: lambda n, own=capture, logs=logs: logs.append(thin_photons(replace(own, seed=n))[1])
                 }
                 relative.append(1e3 * median(side_by_side(works)[kind]) / base_ms)
                 kept.append(100 * logs[-1]["kept_share"])

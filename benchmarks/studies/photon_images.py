@@ -7,6 +7,7 @@ draws Poisson counts from them. Scenes from matt to glass, whose paths differ ev
 import math
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -17,9 +18,9 @@ from benchmarks.figures import curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.photon_distance import Rates, distances
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.photons.thinning import thin_photons
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons, load_recipe
@@ -71,22 +72,22 @@ def measure(
     usual = min(budgets, key=lambda budget: abs(budget - USUAL))
     for scene, name in scenes.items():
         recipe, _ = load_recipe(name, [*VIEWS, *film(side_px)])
-        setup = setup_of(recipe)
-        rates = true_rates(setup, reference)
+        capture = capture_of(recipe)
+        rates = true_rates(capture, reference)
         seconds: dict[tuple[str, float], list[float]] = {}
         for budget in budgets:
             photons = recipe.photons.model_copy(update={"budget": budget})
-            times, counts = _thinned(setup, photons, repeats)
+            times, counts = _thinned(capture, photons, repeats)
             seconds[THINNING, budget] = times
             rows.append(_row(scene, THINNING, 0, budget, times, counts, rates))
         for number in samples:
-            for budget, (times, counts) in _dense(setup, budgets, number, repeats).items():
+            for budget, (times, counts) in _dense(capture, budgets, number, repeats).items():
                 seconds[dense_name(number), budget] = times
                 rows.append(_row(scene, DENSE, number, budget, times, counts, rates))
         ratios.append(
             _ratio(
                 f"{scene}: thinning against dense with {max(samples)} samples, {usual:g} photons per view",
-                setup,
+                capture,
                 recipe.photons.model_copy(update={"budget": usual}),
                 max(samples),
                 repeats,
@@ -96,15 +97,15 @@ def measure(
     return Measured(rows, ratios, list(range(1, repeats + 1)))
 
 
-def _ratio(name: str, setup: Setup, photons: Photons, samples: int, repeats: int) -> Ratio:
+def _ratio(name: str, capture: Capture, photons: Photons, samples: int, repeats: int) -> Ratio:
     """Both ways in turns."""
 
     def dense(number: int) -> None:
-        for view in range(setup.grid.view_count):
-            mosaic, rng = rendered_mosaic(setup, view, samples, number), np.random.default_rng(number)
-            drawn_counts(mosaic, setup.cfa, photons.budget, rng)
+        for view in range(capture.grid.view_count):
+            mosaic, rng = rendered_mosaic(capture, view, samples, number), np.random.default_rng(number)
+            drawn_counts(mosaic, capture.cfa, photons.budget, rng)
 
-    works = {THINNING: lambda n: thin_photons(setup, photons, seed=n), DENSE: dense}
+    works = {THINNING: lambda n: thin_photons(replace(capture, photons=photons, seed=n)), DENSE: dense}
     seconds = side_by_side(works, repeats)
     return ratio_of(name, seconds[DENSE], seconds[THINNING])
 
@@ -114,53 +115,54 @@ def dense_name(samples: int) -> str:
     return f"{DENSE}, {samples}"
 
 
-def true_rates(setup: Setup, samples: int) -> Rates:
+def true_rates(capture: Capture, samples: int) -> Rates:
     """Rates by a long rendering in two halves, whose difference tells the noise that is left."""
-    halves = np.empty((2, setup.grid.view_count, setup.grid.height, setup.grid.width))
+    halves = np.empty((2, capture.grid.view_count, capture.grid.height, capture.grid.width))
     for half, view in np.ndindex(*halves.shape[:2]):
-        halves[half, view] = rendered_mosaic(setup, view, samples // 2, 10_000 + 100 * half + view)
+        halves[half, view] = rendered_mosaic(capture, view, samples // 2, 10_000 + 100 * half + view)
     light = halves.mean(axis=(0, 2, 3), keepdims=True)
-    halves /= light * setup.grid.height * setup.grid.width
+    halves /= light * capture.grid.height * capture.grid.width
     return Rates(halves.mean(axis=0), (halves[0] - halves[1]) ** 2 / 4)
 
 
-def _thinned(setup: Setup, photons: Photons, repeats: int) -> tuple[list[float], np.ndarray]:
+def _thinned(capture: Capture, photons: Photons, repeats: int) -> tuple[list[float], np.ndarray]:
     """Seconds of each repeat, and counts (R, V, H, W)."""
     seconds, counts = [], []
-    thin_photons(setup, photons, seed=0)
+    capture = replace(capture, photons=photons)
+    thin_photons(capture)
     for seed in range(1, repeats + 1):
         start = time.perf_counter()
-        drawn, _ = thin_photons(setup, photons, seed=seed)
+        drawn, _ = thin_photons(replace(capture, seed=seed))
         seconds.append(time.perf_counter() - start)
-        counts.append(as_images(drawn, setup))
+        counts.append(as_images(drawn, capture))
     return seconds, np.array(counts)
 
 
-def as_images(drawn: PhotonTable, setup: Setup) -> np.ndarray:
+def as_images(drawn: PhotonTable, capture: Capture) -> np.ndarray:
     """Counts (V, H, W) of photons in a table."""
-    grid = setup.grid
+    grid = capture.grid
     size = grid.view_count * grid.height * grid.width
     flat = np.bincount(drawn.flat_pixels(grid), weights=drawn.n, minlength=size)
     return flat.reshape(grid.view_count, grid.height, grid.width)
 
 
 def _dense(
-    setup: Setup, budgets: Sequence[float], samples: int, repeats: int
+    capture: Capture, budgets: Sequence[float], samples: int, repeats: int
 ) -> dict[float, tuple[list[float], np.ndarray]]:
     """Of each budget seconds of each repeat, and counts; a rendering serves all budgets."""
-    grid, views = setup.grid, range(setup.grid.view_count)
+    grid, views = capture.grid, range(capture.grid.view_count)
     seconds: dict[float, list[float]] = {budget: [] for budget in budgets}
     counts = {budget: np.zeros((repeats, len(views), grid.height, grid.width)) for budget in budgets}
-    rendered_mosaic(setup, 0, samples, 0)
+    rendered_mosaic(capture, 0, samples, 0)
     for repeat in range(repeats):
         start = time.perf_counter()
-        mosaics = [rendered_mosaic(setup, view, samples, 1 + repeat * len(views) + view) for view in views]
+        mosaics = [rendered_mosaic(capture, view, samples, 1 + repeat * len(views) + view) for view in views]
         rendering = time.perf_counter() - start
         for budget in budgets:
             rng = np.random.default_rng([repeat, int(budget)])
             start = time.perf_counter()
             for view in views:
-                counts[budget][repeat, view] = drawn_counts(mosaics[view], setup.cfa, budget, rng)
+                counts[budget][repeat, view] = drawn_counts(mosaics[view], capture.cfa, budget, rng)
             seconds[budget].append(rendering + time.perf_counter() - start)
     return {budget: (seconds[budget], counts[budget]) for budget in budgets}
 

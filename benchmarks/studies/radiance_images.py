@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.figures import curve, frame
 from benchmarks.machine import has
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, timed
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
@@ -56,31 +56,31 @@ def measure(
     """All ways on every scene, and lengths of paths through glass; the truth has `reference` samples."""
     rows: list[Row] = []
     for scene, recipe in scenes.items():
-        setup = setup_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
-        truth = rendered(setup, reference, 1, seed=10_000)[1][0].astype(np.float64)
+        capture = capture_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
+        truth = rendered(capture, reference, 1, seed=10_000)[1][0].astype(np.float64)
         kind = backend.choose().kind
         for number in samples:
-            seconds, images = rendered(setup, number, repeats)
+            seconds, images = rendered(capture, number, repeats)
             rows.append(_row(scene, kind, number, seconds, images, truth))
             if has("mitsuba-oidn"):
                 rows.append(_denoised_row(scene, kind, number, seconds, images, truth))
         if kind != "scalar":
             for number, (seconds, images) in _by_scalar_mode(recipe, side_px, samples[:3], repeats).items():
                 rows.append(_row(scene, "scalar", number, seconds, images, truth))
-        del setup  # before another variant is set
+        del capture  # before another variant is set
     ratios = _ratios(rows)
     rows += _depth_rows(side_px, samples[-1], repeats, depths)
     rows += _spectral_rows(side_px, samples[:3], repeats)
     return Measured(rows, ratios, list(range(1, repeats + 1)))
 
 
-def rendered(setup: Setup, samples: int, repeats: int, seed: int = 1) -> tuple[list[float], Images]:
+def rendered(capture: Capture, samples: int, repeats: int, seed: int = 1) -> tuple[list[float], Images]:
     """Seconds of each repeat and the images, with seeds from `seed` on; after one that warms up."""
     images: list[np.ndarray] = []
 
     def work(number: int) -> None:
         image = render_view(
-            setup.render_scene, setup.grid, 0, 0, samples_per_pixel=samples, seed=seed + number
+            capture.render_scene, capture.grid, 0, 0, samples_per_pixel=samples, seed=seed + number
         )
         images.append(image)
 
@@ -104,8 +104,8 @@ def _by_scalar_mode(
 
 def scalar_images(recipe: str, side_px: int, samples: Sequence[int], repeats: int) -> None:
     """Write seconds and then images of this process's backend on standard output."""
-    setup = setup_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
-    found = [rendered(setup, number, repeats) for number in samples]
+    capture = capture_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
+    found = [rendered(capture, number, repeats) for number in samples]
     head = json.dumps([seconds for seconds, _ in found]).encode()
     body = np.array([images for _, images in found], np.float32).tobytes()
     sys.stdout.buffer.write(head + b"\n" + body)
@@ -173,7 +173,7 @@ def _depth_rows(side_px: int, samples: int, repeats: int, depths: Sequence[int])
     found: dict[int, tuple[list[float], Images]] = {}
     for depth in depths:
         recipe, _ = load_recipe("glass", [*VIEW, *film(side_px), f"render.max_depth={depth}"])
-        found[depth] = rendered(setup_of(recipe), samples, repeats)
+        found[depth] = rendered(capture_of(recipe), samples, repeats)
     light = found[max(depths)][1].mean()
     return [
         Row(
@@ -193,11 +193,11 @@ def _spectral_rows(side_px: int, samples: Sequence[int], repeats: int) -> list[R
     """Spectral mode of the matt scene, in a camera's raw colours and so to a truth of its own."""
     if backend.choose().kind == "scalar":  # there it takes minutes
         return []
-    setup = setup_of(load_recipe("paper", [*VIEW, *film(side_px), f"sensor.camera={CAMERA}"])[0])
-    truth = rendered(setup, 64 * max(samples), 1, seed=10_000)[1][0].astype(np.float64)
+    capture = capture_of(load_recipe("paper", [*VIEW, *film(side_px), f"sensor.camera={CAMERA}"])[0])
+    truth = rendered(capture, 64 * max(samples), 1, seed=10_000)[1][0].astype(np.float64)
     rows: list[Row] = []
     for number in samples:
-        seconds, images = rendered(setup, number, repeats)
+        seconds, images = rendered(capture, number, repeats)
         rows.append(_row("matt", f"{backend.choose().kind}, spectral", number, seconds, images, truth))
     return rows
 

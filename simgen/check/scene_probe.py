@@ -18,7 +18,7 @@ from simgen.cameras.disparities import apart_px
 from simgen.cameras.rig import corners, with_larger_pixels
 from simgen.dataset.prepared import Prepared
 from simgen.dataset.resources import available_bytes
-from simgen.photons.counting_plan import Plan
+from simgen.photons.exploration import Plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
@@ -134,7 +134,7 @@ def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
-    counting_plan = target.plan(render_scene) if recipe.products.counts else None
+    counting_plan = target.plan(target.capture(render_scene)) if recipe.products.counts else None
     side_px = SIDE_PX if is_compiled else SCALAR_SIDE_PX
     coarse = coarser(grid, side_px)
     # As many paths on a small film, or the start of a rendering would be taken for the time of its paths.

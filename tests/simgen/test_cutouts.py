@@ -120,7 +120,7 @@ def test_photons_pass_holes(tmp_path: Path) -> None:
     built = made([leaf({}), wall], [lamp], max_depth=3, folder=tmp_path)
     view = seen(built, GRID, 1024)
     gain = 20_000 / view.mean() / GRID.height / GRID.width
-    photons, _ = thinned(built, GRID, 3, gain=gain)
+    photons, _ = thinned(built, GRID, gain=gain)
     assert abs(surprise(photons, view, GRID, gain)) < 4
 
 

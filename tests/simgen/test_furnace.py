@@ -61,7 +61,7 @@ def test_thinned_photons_see_nothing_in_the_furnace(spectral: bool) -> None:
     for alone in things(matt(TELLS_NOTHING))[: 1 if SCALAR else 3]:
         built = made([alone], [EVERYWHERE], spectral=spectral)
         gain = wanted / GRID.height / GRID.width / white(built).mean()
-        photons, _ = thinned(built, GRID, 2, gain)
+        photons, _ = thinned(built, GRID, gain)
         found = np.bincount(colours[photons.i, photons.j], minlength=3)
         expected = gain * white(built) * np.bincount(colours.ravel())
         assert (np.abs(found - expected) < 4 * np.sqrt(expected)).all(), found / expected

@@ -70,7 +70,7 @@ def by_hand(parameters: dict[str, Any], *, clear: bool) -> RenderScene:
             "intensity": {"type": "rgb", "value": 0.5e6},
         },
     }
-    return RenderScene(mi, mi.load_dict(scene), np.zeros(8, np.int16), {}, None)
+    return RenderScene(mi, mi.load_dict(scene), np.zeros(8, np.int16), {}, None, DEPTH)
 
 
 @pytest.mark.parametrize(
@@ -141,5 +141,5 @@ def test_photons_are_those_of_the_dense_view() -> None:
     built = made([ball(material), card(600.0, 300.0, material)], [EVERYWHERE, LAMP], max_depth=3)
     view = seen(built, GRID, 512 if SCALAR else 1024)
     gain = (10_000 if SCALAR else 40_000) / view.sum()
-    photons, _ = thinned(built, GRID, 3, gain)
+    photons, _ = thinned(built, GRID, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 5

@@ -110,11 +110,11 @@ def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera
 @pytest.mark.parametrize("lamp", ["D65", "FL2"])
 def test_thinned_photons_of_the_chart_are_those_of_spectral_integration(lamp: str) -> None:
     built, made = chart(lamp, CAMERAS[0])
-    grid, gain = made.grid.camera_grid(), capture_of(made, made.seed).photons_per_radiance
+    grid, gain = made.grid.camera_grid(), capture_of(made, built, made.seed).photons_per_radiance
     assert gain is not None
     # A few hundred photons a patch one by one, or some thousand where that is cheap.
     gain *= 0.05 if lit_views.SCALAR else 0.5
-    photons, _ = lit_views.thinned(built, grid, 2, gain, seed=2)
+    photons, _ = lit_views.thinned(built, grid, gain, seed=2)
     counts = np.zeros((grid.height, grid.width))
     np.add.at(counts, (photons.i, photons.j), 1)
     colours = colour_index(grid.height, grid.width, made.cfa)
@@ -137,7 +137,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     built, made = chart("D65", camera)
     grid, exposure = made.grid.camera_grid(), made.exposure
     assert exposure is not None
-    gain = capture_of(made, made.seed).photons_per_radiance
+    gain = capture_of(made, built, made.seed).photons_per_radiance
     assert gain is not None
     view = render_view(built, grid, 0, 0, samples_per_pixel=256, seed=6).astype(np.float64)
     seen = by_patch(view)[21] * gain  # neutral 5
@@ -176,6 +176,6 @@ def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> 
     grid = recipe(CAMERAS[0]).grid.camera_grid()
     view = lit_views.seen(built, grid, 256, seed=6) * lit_views.white(built)
     gain = (2e4 if lit_views.SCALAR else 4e4) / mosaic(view, "GRBG").sum()
-    photons, log = lit_views.thinned(built, grid, 3, gain, seed=3)
+    photons, log = lit_views.thinned(built, grid, gain, seed=3)
     assert abs(lit_views.surprise(photons, view, grid, gain, block_px=6)) < 5
     assert log["paths_above_bound"] <= max(1e-3 * photons.k.size, 3)

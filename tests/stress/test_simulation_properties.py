@@ -9,8 +9,8 @@ from twins import unit_grid
 
 from pcii.types import PATTERNS, CameraGrid, channel_count
 from simgen.cameras import as_rig, disparities, film_slopes, slopes_behind_lens, with_larger_pixels
+from simgen.photons import ranks_in_scopes
 from simgen.photons.candidates import even_film_points
-from simgen.photons.scopes import places
 from simgen.sensor import PhotonTable, draw_counts, fixed_totals, full_light_image, nested_subset
 from simgen.spec import FullLight, Lens, Photons, Sensor
 
@@ -24,7 +24,7 @@ def photons_of(seed: int, number: int, most: int = 1, scopes: int = 0) -> Photon
     rng = np.random.default_rng(seed)
     k, l, i, j = (rng.integers(0, size, number) for size in GRID.shape_KLHW)
     scope = np.sort(rng.integers(0, scopes, number)) if scopes else None
-    rank = None if scope is None else places(scope)
+    rank = None if scope is None else ranks_in_scopes(scope)
     return PhotonTable(k, l, i, j, rng.integers(1, most + 1, number), scope, rank)
 
 

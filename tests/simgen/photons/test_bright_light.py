@@ -10,7 +10,7 @@ import pytest
 import pcii
 import simgen
 from pcii.base import InputError
-from simgen.photons import Setup
+from simgen.photons import Capture
 from simgen.photons.bright_light import lit_light, mirrored_light, straight_light
 from simgen.photons.exploration import sampler_of_films
 from simgen.renderer import LampTracer, RenderScene, backend, build, render_view
@@ -98,11 +98,11 @@ def test_a_small_lamp_behind_a_tilted_slab_gives_its_light(size_mm: float) -> No
 
 def test_light_is_the_same_from_both_sides() -> None:
     """Of a lamp in view, whose light on a film is known."""
-    render_scene = built(scene_of([lamp()]))
-    setup = Setup(render_scene, GRID, "GRBG", 2)
-    (known,) = straight_light(setup)
+    render_scene = built(scene_of([lamp()]), max_depth=2)
+    capture = Capture(render_scene, GRID, "GRBG")
+    (known,) = straight_light(capture)
     assert known.light == pytest.approx(LAMP_LIGHT, rel=0.02)
-    tracer = LampTracer(render_scene, setup.rig, "GRBG", 2, 60.0)
+    tracer = LampTracer(render_scene, capture.rig, "GRBG", 60.0)
     number = [one.is_environment() for one in tracer.lamps].index(False)
     arrivals, _ = tracer.follow(np.full(1 << 16, number), 1, 0.0)
     error = np.sqrt((arrivals.light**2).sum())
@@ -122,8 +122,8 @@ def test_the_dot_of_a_spot_lamp_has_its_light(cutoff_deg: float) -> None:
         beam_deg=cutoff_deg * 0.999,
         cutoff_deg=cutoff_deg,
     )
-    setup = Setup(built(scene_of([wall(500)], spot), max_depth=2), GRID, None, 2)
-    rows, paths = lit_light(setup, sampler_of_films(setup), REFLECTANCE * PIXELS, 1000)
+    capture = Capture(built(scene_of([wall(500)], spot), max_depth=2), GRID, None)
+    rows, paths = lit_light(sampler_of_films(capture), REFLECTANCE * PIXELS, 1000)
     # The wall has the light of the surroundings as well.
     assert sum(row.light for row in rows) == pytest.approx(PIXELS + REFLECTANCE * dot_px, rel=0.02)
     assert paths.k.size > 4000
@@ -192,8 +192,8 @@ def test_cameras_stand_in_the_medium_of_the_sensor(tmp_path: Path) -> None:
 def test_a_lamp_in_a_scene_with_a_medium_is_in_the_forecast(tmp_path: Path, shape: str) -> None:
     """Also a turned ball, of which Mitsuba mixes up places and normals."""
     scene = reference(tmp_path, FOG + SENSOR.format("") + WALL + ASIDE + SHINING.format(shape))
-    setup = Setup(built(scene, tmp_path, 4), GRID, None, 4)
-    (row,) = mirrored_light(setup, 0.6 * PIXELS, 1 << 15, with_straight=True)
+    capture = Capture(built(scene, tmp_path, 4), GRID, None)
+    (row,) = mirrored_light(capture, 0.6 * PIXELS, 1 << 15, with_straight=True)
     image_px = np.pi * (0.1 / 500 * FOCAL_PX) ** 2
     assert row.light == pytest.approx(3e5 * image_px, rel=0.15)
     if shape == "disk":
@@ -212,8 +212,8 @@ def test_a_bright_spot_of_a_picture_counts_by_itself(tmp_path: Path) -> None:
         shape=simgen.Card(width_mm=60, height_mm=60),
         material=simgen.Material(reflectance=(0, 0, 0), emission=emission),
     )
-    setup = Setup(built(scene_of([screen]), tmp_path), GRID, None, 2)
-    rows = sorted(straight_light(setup), key=lambda row: row.radiance)
+    capture = Capture(built(scene_of([screen]), tmp_path), GRID, None)
+    rows = sorted(straight_light(capture), key=lambda row: row.radiance)
     texel_px = (60 / 64 / 500 * FOCAL_PX) ** 2
     assert rows[-1].radiance > 5e3
     assert rows[-1].image_px < 2 * texel_px

@@ -65,24 +65,24 @@ def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) 
     over.light[:] = [[0.0, 40.0, 0.0]] * 4
     over.z_mm[:] = 300.0
     before = majorant.layer.size
-    majorant.lift(over)
+    majorant.list_and_raise(over)
     entry = majorant.owner_of(over)
     assert (majorant.bound[entry, 1] > 40).all()
     assert (majorant.radiance_ratio_bound[entry, 1] * over.guess[:, 1] > 40).all()
-    assert (majorant.bound >= DIM).all()  # green was lifted, and blue is not black for it
+    assert (majorant.bound >= DIM).all()  # green was raised, and blue is not black for it
     assert majorant.layer.size >= before
 
 
 @pytest.mark.parametrize("reach", [1, 3])
 @pytest.mark.parametrize("is_listed", [True, False])
 def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, is_listed: bool, reach: int) -> None:
-    lifted = majorant if is_listed else Majorant(GRID, majorant.layers, DIM)
+    raised = majorant if is_listed else Majorant(GRID, majorant.layers, DIM)
     over = pilot(3).take(np.array([0]))._replace(row=np.array([48]), col=np.array([64]))
     over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
-    lifted.lift(over, reach)
-    _, row, col = lifted.layers.layer_row_col(lifted.layers.tiles_of(over))
-    bright = np.flatnonzero(lifted.bound[:, 1] > 40)
-    apart = np.maximum(abs(lifted.row[bright] - row), abs(lifted.col[bright] - col))
+    raised.list_and_raise(over, reach)
+    _, row, col = raised.layers.layer_row_col(raised.layers.tiles_of(over))
+    bright = np.flatnonzero(raised.bound[:, 1] > 40)
+    apart = np.maximum(abs(raised.row[bright] - row), abs(raised.col[bright] - col))
     assert bright.size == (2 * reach + 1) ** 2
     assert apart.max() == reach
 

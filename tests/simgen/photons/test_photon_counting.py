@@ -13,11 +13,12 @@ from scipy import stats
 from pcii.base import InputError, silent
 from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, Dataset, nested_name, open_dataset
 from pcii.types import Light, PhotonCounts, colour_index
-from simgen.dataset import capture_of
+from simgen.dataset import capture_of, draw_from_views, write_counts
 from simgen.dataset.prepared import least_samples
-from simgen.photons import Plan, Setup, draw_from_views, photon_counting, probe, write_counts
+from simgen.photons import MAX_NOISE_SHARE, Capture, Plan, probe, thin_photons
 from simgen.photons import counting_plan as module
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, PROBE_SEED
+from simgen.photons.counting_plan import PROBE_SEED
+from simgen.photons.light_probe import MAX_NORMALISER_ERROR
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import PhotonTable, nested_subset
 from simgen.spec import Recipe, Scene, load_scene
@@ -44,18 +45,19 @@ def mosaic_of(k: int, l: int) -> np.ndarray:
     return (1 + 2 * k + l) * ((7 * np.arange(HEIGHT * WIDTH)) % 23.0).reshape(HEIGHT, WIDTH)
 
 
-def setup_of(made: Recipe, render_scene: RenderScene) -> Setup:
-    return Setup(render_scene, capture_of(made, made.seed).rig, made.cfa, made.render.max_depth)
-
-
 def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
-    setup = setup_of(made, render_scene)
-    capture, samples = capture_of(made, made.seed), least_samples(made)
-    return module.plan(capture, setup, kind, samples, may_explore=lambda _: False)
+    capture = capture_of(made, render_scene, made.seed)
+    return module.plan_counts(capture, kind, least_samples(made), may_explore=lambda _: False)
 
 
 def thin(made: Recipe, render_scene: RenderScene, plan: Plan = PLAN) -> PhotonTable:
-    return photon_counting.thin(capture_of(made, made.seed), setup_of(made, render_scene), plan)[0]
+    return thin_photons(capture_of(made, render_scene, made.seed), plan)[0]
+
+
+def without_scene(made: Recipe) -> Capture:
+    """For counts that are drawn from made-up views."""
+    no_scene: Any = None
+    return capture_of(made, no_scene, made.seed)
 
 
 def no_noise(k: int, l: int) -> np.ndarray:
@@ -63,7 +65,7 @@ def no_noise(k: int, l: int) -> np.ndarray:
 
 
 def dense(made: Recipe) -> PhotonTable:
-    return draw_from_views(capture_of(made, made.seed), mosaic_of, no_noise, PLAN, silent)[0]
+    return draw_from_views(without_scene(made), mosaic_of, no_noise, PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +189,7 @@ def test_smaller_budgets_do_not_change_the_whole(statistics: str) -> None:
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
     arrivals, log = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
+        without_scene(made), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
@@ -195,7 +197,7 @@ def test_views_without_light_have_no_photons_of_any_budget() -> None:
             budget
         ]
     black, log = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
+        without_scene(made), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
     )
     assert log["views_without_light"] == 4
     assert subset(black, made, 8).k.size == 0
@@ -233,7 +235,7 @@ IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
 @pytest.mark.parametrize("sensor", [{}, {"bits": 1}, FAULTY, FAULTY | {"bits": 2}, IN_FRAMES])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
-    told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
+    told = write_counts(without_scene(made), made.sensor, dense(made), tmp_path, with_origins=True)
     whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
     assert (small <= middle).all()
     assert (middle <= whole).all()
@@ -250,14 +252,14 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
 def test_without_faults_what_arrives_is_what_is_written(tmp_path: Path) -> None:
     made = recipe(photons={"budget": 500})
     arrivals = dense(made)
-    told = write_counts(capture_of(made, made.seed), made.sensor, arrivals, tmp_path, with_origins=True)
+    told = write_counts(without_scene(made), made.sensor, arrivals, tmp_path, with_origins=True)
     np.testing.assert_array_equal(stored(tmp_path, made), counted(arrivals, made))
     assert told["arrived"] == told["total"] == arrivals.n.sum()
 
 
 def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     lost = recipe(sensor={"quantum_efficiency": (1e-9,) * 3, "dark_counts": 0.5})
-    write_counts(capture_of(lost, lost.seed), lost.sensor, dense(lost), tmp_path, with_origins=True)
+    write_counts(without_scene(lost), lost.sensor, dense(lost), tmp_path, with_origins=True)
     whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
     np.testing.assert_array_equal(whole, small)
     assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
@@ -279,9 +281,7 @@ def from_known_places(made: Recipe) -> PhotonTable:
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))
-    write_counts(
-        capture_of(made, made.seed), made.sensor, from_known_places(made), tmp_path, with_origins=True
-    )
+    write_counts(without_scene(made), made.sensor, from_known_places(made), tmp_path, with_origins=True)
     origins = zarr.open_group(tmp_path / nested_name(PHOTON_TRUTH, budget), mode="r")
     object_id, z_mm = np.asarray(origins["object_id"]), np.asarray(origins["z_mm"])
     counts = stored(tmp_path, made, budget).ravel()
@@ -297,7 +297,7 @@ def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: di
 
 def test_frames_are_written_on_request_and_nested_like_the_photons(tmp_path: Path) -> None:
     made = recipe(sensor=IN_FRAMES | {"frames": 40}, photons=nested(scope="scene"))
-    capture, arrivals = capture_of(made, made.seed), from_known_places(made)
+    capture, arrivals = without_scene(made), from_known_places(made)
     write_counts(capture, made.sensor, arrivals, tmp_path, with_origins=True, keeps_frames=True)
     bits: dict[float | None, set[tuple[int, ...]]] = {}
     for budget in (None, 40, 8):
@@ -386,7 +386,7 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
     two_objects: RenderScene, scope: str, budget: float, pixels: int
 ) -> None:
     dim = recipe(grid=PROBED, photons={"budget": budget, "scope": scope})
-    seen = probe(Setup(two_objects, dim.grid.camera_grid(), "GRBG", 3), PROBE_SEED)
+    seen = probe(capture_of(dim, two_objects, 1), PROBE_SEED)
     made = planned(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
     assert made.normaliser_error == pytest.approx(error)

@@ -1,6 +1,5 @@
-"""The photon counts of a dataset: thinned or drawn from views, counted by the sensor, written."""
+"""The photon counts of a dataset: drawn from rendered views, counted by the sensor, written."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,36 +8,18 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base.progress import Report
 from pcii.store.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.store.dataset_writer import write_counts as save_counts
 from pcii.store.dataset_writer import write_photon_truth
 from pcii.types.photon_limit import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan
-from simgen.photons.scopes import places
-from simgen.photons.thinning import thin_photons
+from simgen.photons.capture import Capture, ranks_in_scopes
+from simgen.photons.exploration import Plan
+from simgen.photons.light_probe import MAX_NOISE_SHARE
 from simgen.sensor import detector
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
-
-
-def thin(
-    capture: Capture, setup: Setup, plan: Plan, report: Report = silent
-) -> tuple[PhotonTable, dict[str, Any]]:
-    """Photons of all views drawn one by one, and what the manifest says of them; see `thin_photons`."""
-    photons, log = thin_photons(
-        setup,
-        capture.photons,
-        seed=capture.seed,
-        photons_per_radiance=capture.photons_per_radiance,
-        explored=plan.explored,
-        keeps_origins=plan.keeps_origins,
-        report=report,
-    )
-    dense_paths = plan.samples * math.prod(capture.grid.shape_KLHW)
-    return photons, log | {"dense_paths_instead": dense_paths, "normaliser_standard_error": 0.0}
 
 
 def draw_from_views(
@@ -54,11 +35,11 @@ def draw_from_views(
     noise that adds more than `MAX_NOISE_SHARE` to the variance of the counts, and for too much light in a
     pixel.
     """
-    scopes, cfa, photons, gain = capture.scopes, capture.cfa, capture.photons, capture.photons_per_radiance
+    cfa, photons, gain = capture.cfa, capture.photons, capture.photons_per_radiance
     views = list(np.ndindex(capture.grid.rows, capture.grid.cols))
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
     normalisers, gains = energies, np.full_like(energies, 0.0 if gain is None else gain)
-    if scopes.is_of_all_views:
+    if capture.has_one_budget:
         normalisers = np.broadcast_to(energies.sum(axis=0), energies.shape)
     if gain is None:
         np.divide(photons.budget, normalisers, out=gains, where=normalisers > 0)
@@ -146,8 +127,8 @@ def write_counts(
 def _rank(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
     """A row for each photon, with its scope and a random rank there, so that budgets can be nested."""
     rows = arrivals.one_by_one()
-    scope = capture.scopes.scope_of(rows)
+    scope = capture.scope_of(rows)
     order = np.lexsort((seeds.generator(capture.seed, stage="nested ranks").random(scope.size), scope))
     rank = np.empty(scope.size, dtype=np.int64)
-    rank[order] = places(scope[order])
+    rank[order] = ranks_in_scopes(scope[order])
     return replace(rows, scope=scope, rank=rank)
