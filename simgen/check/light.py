@@ -6,7 +6,7 @@ import numpy as np
 
 from pcii.types.bayer import channel_count
 from pcii.types.photon_counts import NEGLIGIBLE_LOSS, clipped_mean
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts
+from simgen.check.facts import Facts, Finding, ObjectFacts
 from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes, shortage
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 

@@ -56,17 +56,7 @@ def draw_from_views(
     totals = detector.fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns = []
     for number, (k, l) in enumerate(views):
-        raw = mosaic_of(k, l)
-        if gain is not None:
-            rates = raw * gain
-            if not np.nanmax(rates) <= MOST_PHOTONS:
-                raise InputError(
-                    f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
-                )
-        else:
-            assert photons.scope != "exposure"  # which has a gain
-            light = Light(photons.budget, photons.scope)
-            rates = photon_rates(raw, cfa, light, normalisers[number])
+        rates = _photon_rates(capture, mosaic_of(k, l), normalisers[number], (k, l))
         rng = seeds.generator(capture.seed, view=number, stage="photons")
         counts = detector.draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)
@@ -85,6 +75,20 @@ def draw_from_views(
         "normaliser_standard_error": plan.normaliser_error,
         "bright_light_forecast": [light.log for light in plan.bright_light],
     }
+
+
+def _photon_rates(
+    capture: Capture, mosaic: np.ndarray, normaliser: np.ndarray, view: tuple[int, int]
+) -> np.ndarray:
+    """Mean photons (H, W) of each pixel of a view, of which the scopes' light (C,) is the `normaliser`."""
+    gain, photons = capture.photons_per_radiance, capture.photons
+    if gain is None:
+        assert photons.scope != "exposure"  # which has a gain
+        return photon_rates(mosaic, capture.cfa, Light(photons.budget, photons.scope), normaliser)
+    rates = mosaic * gain
+    if not np.nanmax(rates) <= MOST_PHOTONS:
+        raise InputError(f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view {view}")
+    return rates
 
 
 def write_counts(

@@ -12,7 +12,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from simgen.check import coarser, load_target
+from simgen.cameras import coarser
+from simgen.check import load_target
 from simgen.renderer import backend, build
 from simgen.spec import Grid, Light, Scene, Shape, Spectrum, Texture, load_recipe, load_scene
 from simgen.spec.materials import Finish

@@ -11,8 +11,8 @@ from lit_scenes import ball
 
 from pcii.base import command_line
 from simgen.app import commands as cli
-from simgen.cameras import apart_px, disparities_px
-from simgen.check import Facts, Finding, ObjectFacts, coarser, findings, probe_scene
+from simgen.cameras import apart_px, coarser, disparities_px
+from simgen.check import Facts, Finding, ObjectFacts, findings, probe_scene
 from simgen.check.depths import depth_findings, focus_share
 from simgen.check.light import cost_findings, photon_findings, photons_per_view, seconds
 from simgen.check.sight import sight_findings
