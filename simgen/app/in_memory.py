@@ -62,9 +62,9 @@ def draw_photons(
     >>> counts, truth = draw_photons(load_scene("two_objects"), grid, seed=1,
     ...                              sensor={"dark_counts": 1e-4})                  # doctest: +SKIP
     """
-    own = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
+    settings = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
     values = {
-        "sensor": {"cfa": "none" if cfa is None else cfa} | own,
+        "sensor": {"cfa": "none" if cfa is None else cfa} | settings,
         "photons": {"budget": budget},
         "render": {"max_depth": max_depth},
     }

@@ -246,9 +246,9 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
     owner, number_of, all_corners = np.array(owners), np.array(counts), np.array(corners).reshape(-1, 3)
     values = [np.array(one) for one in points.values()]
     parts = {}
-    for name, own in groups.items():
-        triples = all_corners[np.repeat(owner == own, number_of)]
-        parts[name] = _obj_mesh(values, triples, number_of[owner == own])
+    for name, group in groups.items():
+        triples = all_corners[np.repeat(owner == group, number_of)]
+        parts[name] = _obj_mesh(values, triples, number_of[owner == group])
     return libraries, parts
 
 
@@ -260,7 +260,8 @@ def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray)
     keys = triples @ [uv_count * normal_count, normal_count, 1]
     _, first, vertices = np.unique(keys, return_index=True, return_inverse=True)
     positions, uv, normals = (
-        one[own] if own[0] >= 0 else None for one, own in zip(values, triples[first].T, strict=True)
+        one[numbers] if numbers[0] >= 0 else None
+        for one, numbers in zip(values, triples[first].T, strict=True)
     )
     assert positions is not None
     return Triangles.checked(positions, triangulate(vertices.ravel(), counts, positions), normals, uv)

@@ -123,8 +123,8 @@ class Prepared:
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
-        with ThreadPoolExecutor(1) as beside:  # the files are read by another process while this one loads
-            assets = beside.submit(read_assets, self.scene, self.folder)
+        with ThreadPoolExecutor(1) as reader:  # the files are read while the renderer loads
+            assets = reader.submit(read_assets, self.scene, self.folder)
             mi = backend.load(spectral=self.recipe.is_spectral)
             described = self.scene, self.folder, self.recipe.render.max_depth, self.curves
             return build(mi, *described, assets.result())
@@ -158,9 +158,9 @@ def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = Non
         around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
         analysis = Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
     resolved = recipe.model_copy(update={"analysis": analysis})
-    beside, grid = recipe_folder or Path(), recipe.grid.camera_grid()
-    curves = sensitivities(recipe.sensor, beside)
-    return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, beside))
+    files, grid = recipe_folder or Path(), recipe.grid.camera_grid()
+    curves = sensitivities(recipe.sensor, files)
+    return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, files))
 
 
 def capture_of(

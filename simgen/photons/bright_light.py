@@ -136,13 +136,13 @@ def mirrored_light(
         return []
     kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
     for row in _rows(kinds, arrivals.light, arrivals.radiance):
-        own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
+        alike, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
         name = _name(capture, tracer.objects[lamp])
-        if own.bounces.any():
-            clear = capture.render_scene.names.get(int(np.bincount(own.object_id).argmax()))
+        if alike.bounces.any():
+            clear = capture.render_scene.names.get(int(np.bincount(alike.object_id).argmax()))
             name += " through what is no object" if clear is None else f" through '{clear}'"
-        seen = BrightLight.of(name, own.light, own.radiance)
-        result.append(seen if is_scattered else seen._replace(arrivals=own, bounces=bounces))
+        seen = BrightLight.of(name, alike.light, alike.radiance)
+        result.append(seen if is_scattered else seen._replace(arrivals=alike, bounces=bounces))
     return result
 
 
@@ -182,12 +182,12 @@ def lit_light(
     tracer = LampTracer(capture.render_scene, capture.rig, capture.cfa, 0.0)
     least_radiance = brightest_that_matters(film_light, paths, capture.grid.height * capture.grid.width)
     rows, seen = list[BrightLight](), [nothing(capture.channels).exceeding]
-    for places in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
-        view = np.arange(places.area_mm2.size) % capture.grid.view_count
+    for lit in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
+        view = np.arange(lit.area_mm2.size) % capture.grid.view_count
         k, l = np.divmod(view, capture.grid.cols)
-        away_mm = places.point_mm - capture.rig.position_mm[k, l]
+        away_mm = lit.point_mm - capture.rig.position_mm[k, l]
         row, col, z_mm = film_px(capture.rig, view, away_mm, np.zeros((2, 1)))
-        image_px = places.area_mm2 * image_px_per_mm2(capture.rig, places.normal, away_mm, z_mm)
+        image_px = lit.area_mm2 * image_px_per_mm2(capture.rig, lit.normal, away_mm, z_mm)
         here = np.flatnonzero(is_on_film(capture.grid, row + 0.5, col + 0.5) & (image_px > 0))
         if not here.size:
             continue

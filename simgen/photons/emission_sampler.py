@@ -92,7 +92,7 @@ class EmissionSampler:
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
         light = self.arriving(view, np.random.default_rng(seed))
-        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
+        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
         light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
         k, l = np.divmod(view[light.candidate], self.capture.grid.cols)
         origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
@@ -149,8 +149,8 @@ class EmissionSampler:
         away_mm = point_mm - camera_mm
         row_px, col_px, z_mm = film_px(rig, view, away_mm, lens_point)
         sent = stretch * image_px_per_mm2(rig, normal, away_mm, z_mm)
-        places = surface, point_mm, camera_mm, texcoord, row_px, col_px
-        return ShiningPoints(*places, sent, self.pieces.bound[piece])
+        points = surface, point_mm, camera_mm, texcoord, row_px, col_px
+        return ShiningPoints(*points, sent, self.pieces.bound[piece])
 
     def _radiance(self, points: ShiningPoints) -> np.ndarray:
         """Radiance (N, C) of points of surfaces, in the sensor's colours."""

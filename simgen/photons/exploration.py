@@ -66,8 +66,6 @@ MEAN_OF = 4
 """Rehearsals end if the first is within `MAX_MISSING_SD`, or else the mean of this many is: of light in rare
 paths one of them may have met little by chance. If neither is so, views are rendered."""
 MAX_REACH_TILES = 4
-EXCESS_SHARE = 1e-5
-"""Share of the light that the warm-up leaves above the majorant."""
 KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
 MIN_KEPT_SHARE = 1e-4
@@ -371,9 +369,7 @@ def _warm_up(
         paths += sampler.count_paths(number, accepted.ratio.size)
         kept_share = max(accepted.photons.k.size / number, MIN_KEPT_SHARE)
         if turn < 0:
-            factor = _factor(accepted.ratio)
-            kept_share = max(kept_share / factor, MIN_KEPT_SHARE)
-            majorant.scale(factor)
+            kept_share = max(kept_share / majorant.fit_scale(accepted.ratio), MIN_KEPT_SHARE)
         # Rare light shows on few tiles at a time, so tiles farther away are raised too.
         majorant.list_and_raise(accepted.exceeding, reach=int(np.clip(1 + turn // 2, 1, MAX_REACH_TILES)))
         if turn < 0:
@@ -406,14 +402,3 @@ def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.nda
     radiance = exceeding.light[np.arange(colour.size), colour]
     ratio = accepted.ratio[accepted.ratio > 1].astype(np.float64)
     return [BrightLight.of(RARE, ratio * mass_per_candidate, radiance)]
-
-
-def _factor(ratio: np.ndarray) -> float:
-    """By how much to raise all limits for the light above them to be at most `EXCESS_SHARE`."""
-    allowed = EXCESS_SHARE * ratio.sum()
-    ratio = np.sort(ratio)[::-1]
-    # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
-    above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
-    if allowed <= 0:
-        return 1.0
-    return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))

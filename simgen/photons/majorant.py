@@ -37,7 +37,8 @@ GAP_TILES = 3
 """Gaps of this many tiles to every side are closed in a layer."""
 RAISE_FACTOR = 1.25
 """Where a path exceeds its bound, the bound is raised to this many times its radiance."""
-
+EXCESS_SHARE = 1e-5
+"""Share of the light that the warm-up leaves above the majorant."""
 NEXT_LAYERS = (0, -1, 1)
 """Layers in which a path's tile is looked for: that of its first hit, then those beside it."""
 ENDLESS = 1e30
@@ -96,6 +97,20 @@ class Majorant:
         listed = slice(self.coarse_count, None)
         self.bound[listed] = np.maximum(self.bound[listed] * factor, self.dim)
         self.radiance_ratio_bound[listed] *= factor
+
+    def fit_scale(self, ratio: np.ndarray) -> float:
+        """Scale the limits so that at most `EXCESS_SHARE` of the light lies above them; and by how much.
+
+        `ratio` (N,) is radiance over limit of paths.
+        """
+        allowed, factor = EXCESS_SHARE * ratio.sum(), 1.0
+        ratio = np.sort(ratio)[::-1]
+        # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
+        above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
+        if allowed > 0:
+            factor = float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))
+        self.scale(factor)
+        return factor
 
     def list_and_raise(self, exceeding: Samples, reach: int = 1) -> None:
         """Raise limits above the radiance of these paths, on their tiles and on those up to `reach` away.

@@ -68,7 +68,7 @@ class MirrorImages:
         """
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
+        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
         bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
         here = is_of_group[group[candidate], bayer]
         points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
@@ -208,13 +208,13 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
     spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(capture.rig, fitted)
     paths = (FIRST_HITS * 2 * np.pi * spread_px**2 / light.image_px).sum()
     moved_px = (seen_px - aside_mm @ fitted[:, 1:]).reshape(-1, 2) + 0.5
-    places = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
-    if not places.view.size:
-        return places
-    which = _evenly_by_pixel(places, int(np.clip(paths, *FIRST_PATHS)), rng)
-    aside_px = rng.standard_normal((2, which.size)) * spread_px[places.view[which]]
-    row, col = places.row[which] + aside_px[0], places.col[which] + aside_px[1]
-    return FilmPoints(places.view[which], row, col).on_film(grid)
+    points = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
+    if not points.view.size:
+        return points
+    which = _evenly_by_pixel(points, int(np.clip(paths, *FIRST_PATHS)), rng)
+    aside_px = rng.standard_normal((2, which.size)) * spread_px[points.view[which]]
+    row, col = points.row[which] + aside_px[0], points.col[which] + aside_px[1]
+    return FilmPoints(points.view[which], row, col).on_film(grid)
 
 
 def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:

@@ -37,11 +37,12 @@ class ScalarSampler(CandidateSampler):
         object_id, z_mm = object_id[followed], z_mm[followed]
         light = self._follow(candidates, rng)
         self.require_finite(light.sum(axis=1), candidates, object_id)
-        own, place = light[np.arange(len(light)), candidates.colour], (candidates.entry, candidates.colour)
+        radiance = light[np.arange(len(light)), candidates.colour]
+        place = candidates.entry, candidates.colour
         bound = self.majorant.bound[place]
         floor = 0.0 if self.below is None else self.below.bound[place]
-        ratio = own / bound
-        kept = np.flatnonzero(chance[candidate] * bound < np.minimum(own, bound) - floor)
+        ratio = radiance / bound
+        kept = np.flatnonzero(chance[candidate] * bound < np.minimum(radiance, bound) - floor)
         exceeding = np.flatnonzero(ratio > 1)
         photon, origin = _take(candidates, kept), {"object_id": object_id[kept], "z_mm": z_mm[kept]}
         return Accepted(

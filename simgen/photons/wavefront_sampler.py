@@ -61,8 +61,8 @@ class WavefrontSampler(CandidateSampler):
         self.entry = unsigned(mi, np.concatenate([entries.repeat(cells.size) for cells in groups]))
         self.cell = unsigned(mi, np.concatenate([np.tile(cells, entries.size) for cells in groups]))
         self.colour_of_cell = unsigned(mi, self.colours)
-        places = majorant.layer, majorant.row, majorant.col, majorant.side_px, majorant.entry_of
-        self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in places)
+        tiles = majorant.layer, majorant.row, majorant.col, majorant.side_px, majorant.entry_of
+        self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in tiles)
         self.dim, self.bounds = floats(mi, majorant.dim), self._upload_bounds(majorant)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
         self.bounds_below = self._upload_bounds(below)

@@ -139,16 +139,16 @@ class MitsubaXml:
                 return
             if not file:
                 refuse("a file name is empty")
-            places = folders  # where Mitsuba looks for it
+            searched = folders  # where Mitsuba looks for it
             if tag == "string":
-                places = folders[-1:]
+                searched = folders[-1:]
             elif tag == "include":
-                places = own_folder, *folders
-            file = self._first(file, places)
+                searched = own_folder, *folders
+            file = self._first(file, searched)
             asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
-                names.extend(self._read(file, places, depth + len(parents)))
+                names.extend(self._read(file, searched, depth + len(parents)))
 
         parser.StartElementHandler, parser.EndElementHandler = start, lambda _: parents.pop()
         parser.StartDoctypeDeclHandler = lambda *_: refuse("a scene has no DOCTYPE and no entities")
