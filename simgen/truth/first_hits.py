@@ -106,7 +106,7 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
     z = np.pad(hits.z_mm, 1, constant_values=np.inf)
     nearer = hits.z_mm * np.float32(1 - LEAST_STEP)
     neighbours = z[1:-1, :-2], z[1:-1, 2:], z[:-2, 1:-1], z[2:, 1:-1]
-    row, col = np.nonzero(sum((each < nearer).astype(np.uint8) for each in neighbours) >= 2)
+    row, col = np.nonzero(np.sum([each < nearer for each in neighbours], axis=0, dtype=np.uint8) >= 2)
     if not row.size:
         return
     down, right = BESIDE_EDGE_PX * np.array([[-1, -1, 1, 1], [-1, 1, -1, 1]])
