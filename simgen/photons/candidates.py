@@ -69,11 +69,12 @@ def is_on_film(grid: CameraGrid, row: Any, col: Any) -> Any:
     return (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
 
 
-def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) -> FilmPoints:
+def even_film_points(grid: CameraGrid, number: int, seed: int) -> FilmPoints:
     """About `number` points: one in each cell of a lattice over the film.
 
     Views take turns. Points come in random order, so that the first of them are spread as all are.
     """
+    rng = np.random.default_rng(seed)
     rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
     cols = max(1, round(number / rows))
     cell = rng.permutation(rows * cols)

@@ -208,7 +208,11 @@ def _send_pilot(capture: Capture, emission: EmissionSampler) -> _Pilot:
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
-    samples = [first, lit, sampler.trace(_spread_evenly(capture, rays, path_seed), followed, path_seed)]
+    samples = [
+        first,
+        lit,
+        sampler.trace(even_film_points(capture.grid, rays, path_seed), followed, path_seed),
+    ]
     aimed = _aimed_points(capture, emission)
     if aimed.view.size:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
@@ -269,17 +273,13 @@ def _send_first_pilot(sampler: CandidateSampler) -> tuple[Samples, int]:
     round_number, rays, paths = 0, FIRST_RAYS, 0
     while True:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
-        points = _spread_evenly(sampler.capture, rays, path_seed)
+        points = even_film_points(sampler.capture.grid, rays, path_seed)
         samples = sampler.trace(points, rays, path_seed)
         samples = samples.take(samples.followed)
         paths += sampler.count_paths(rays, rays)
         if samples.light.any() or rays >= sampler.max_dark_candidates:
             return samples, paths
         round_number, rays = round_number + 1, rays * 4
-
-
-def _spread_evenly(capture: Capture, rays: int, seed: int) -> FilmPoints:
-    return even_film_points(capture.grid, rays, np.random.default_rng(seed))
 
 
 def _aimed_points(capture: Capture, emission: EmissionSampler) -> FilmPoints:
@@ -306,7 +306,7 @@ def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: fl
     capture, grid = sampler.capture, sampler.capture.grid
     rays = int(min(RAYS_PER_CONTRAST * contrast, MAX_OPENING_RAYS))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=3)
-    openings = _trace_misses(sampler, _spread_evenly(capture, rays, path_seed), path_seed)
+    openings = _trace_misses(sampler, even_film_points(capture.grid, rays, path_seed), path_seed)
     depths_mm = z_mm[np.isfinite(z_mm)].astype(np.float64)
     if not openings.k.size or not depths_mm.size:
         return openings, rays

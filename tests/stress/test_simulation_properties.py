@@ -128,7 +128,7 @@ def test_rays_of_a_lens_meet_where_it_is_in_focus(grid, aperture, focus, row, co
 
 @given(grids, st.integers(1, 500), SEEDS)
 def test_points_of_the_film_are_on_the_film(grid: CameraGrid, number: int, seed: int) -> None:
-    view, i, j = even_film_points(grid, number, np.random.default_rng(seed))
+    view, i, j = even_film_points(grid, number, seed)
     assert ((i >= 0) & (i < grid.height) & (j >= 0) & (j < grid.width)).all()
     assert ((view >= 0) & (view < grid.view_count)).all()
     assert number / 2 - 1 <= view.size <= 2 * number + 1
