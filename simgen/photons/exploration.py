@@ -208,11 +208,8 @@ def _send_pilot(capture: Capture, emission: EmissionSampler) -> _Pilot:
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
-    samples = [
-        first,
-        lit,
-        sampler.trace(even_film_points(capture.grid, rays, path_seed), followed, path_seed),
-    ]
+    points = even_film_points(capture.grid, rays, path_seed)
+    samples = [first, lit, sampler.trace(points, followed, path_seed)]
     aimed = _aimed_points(capture, emission)
     if aimed.view.size:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
