@@ -17,9 +17,9 @@ FIRST_NUMBER = 100
 
 def capture_of(recipe: Recipe) -> Capture:
     """The recipe's scene as perfect cameras see it."""
-    scene, folder = load_scene(recipe.scene)
+    scene = load_scene(recipe.scene)
     mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
-    built = build(mi, scene, folder, recipe.render.max_depth, curves)
+    built = build(mi, scene, scene.folder or Path(), recipe.render.max_depth, curves)
     return Capture(built, recipe.grid.camera_grid(), recipe.cfa, recipe.photons)
 
 

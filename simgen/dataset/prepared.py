@@ -145,7 +145,7 @@ class Prepared:
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
     """Look up what a recipe in `recipe_folder` names; `InputError` if it is missing or wrong."""
-    scene, _ = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
+    scene = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
     return prepare_scene(recipe, scene, recipe_folder)
 
 

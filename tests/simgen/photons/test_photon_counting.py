@@ -70,8 +70,8 @@ def dense(made: Recipe) -> PhotonTable:
 
 @pytest.fixture(scope="module")
 def two_objects() -> RenderScene:
-    found, folder = load_scene("two_objects")
-    return build(backend.load(), found, folder, 3)
+    found = load_scene("two_objects")
+    return build(backend.load(), found, found.folder or Path(), 3)
 
 
 def counted(counts: PhotonTable, made: Recipe) -> np.ndarray:
