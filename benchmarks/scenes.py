@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.sensor.detector import sensitivities
@@ -10,12 +10,12 @@ from simgen.spec.recipe import Recipe
 from simgen.spec.scene_lookup import load_scene
 
 
-def setup_of(recipe: Recipe) -> Setup:
-    """The recipe's scene and cameras."""
-    scene, folder = load_scene(recipe.scene)
+def capture_of(recipe: Recipe) -> Capture:
+    """The recipe's scene as perfect cameras see it."""
+    scene = load_scene(recipe.scene)
     mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
-    built = build(mi, scene, folder, recipe.render.max_depth, curves)
-    return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
+    built = build(mi, scene, scene.folder or Path(), recipe.render.max_depth, curves)
+    return Capture(built, recipe.grid.camera_grid(), recipe.cfa, recipe.photons)
 
 
 def film(side_px: int) -> list[str]:

@@ -25,8 +25,8 @@ from pcii.types.photon_limit import sense
 from pcii.types.section_stack import Sections
 from simgen.dataset.generation import Reuse, generate, make
 from simgen.dataset.prepared import Prepared, prepare
-from simgen.photons.candidates import Setup
-from simgen.photons.exploration import Exploration, explore
+from simgen.photons.capture import Capture
+from simgen.photons.exploration import Plan, explore
 from simgen.photons.thinning import thin_photons
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spec.recipe import Recipe
@@ -64,33 +64,33 @@ class World:
         return self.prepared.render_scene()
 
     @cached_property
-    def setup(self) -> Setup:
+    def capture(self) -> Capture:
         """Scene and cameras."""
         recipe = self.recipe
-        return Setup(self.scene, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
+        return Capture(self.scene, recipe.grid.camera_grid(), recipe.cfa, recipe.photons, seed=3)
 
     @cached_property
-    def explored(self) -> Exploration:
+    def explored(self) -> Plan:
         """What is found out about the light."""
-        return explore(self.setup, self.recipe.photons)
+        return explore(self.capture)
 
     @cached_property
     def images(self) -> np.ndarray:
         """Dense counts (K, L, H, W) of plenty of light."""
-        shape = self.setup.grid.shape_KLHW
+        shape = self.capture.grid.shape_KLHW
         return np.random.default_rng(self.recipe.seed).poisson(BRIGHT, shape)
 
     @cached_property
     def few(self) -> np.ndarray:
         """Dense counts of little light."""
-        return np.random.default_rng(self.recipe.seed).poisson(0.01, self.setup.grid.shape_KLHW)
+        return np.random.default_rng(self.recipe.seed).poisson(0.01, self.capture.grid.shape_KLHW)
 
     @cached_property
     def events(self) -> PhotonCounts:
         """The same as events."""
         k, l, i, j = np.nonzero(self.few)
         n = self.few[k, l, i, j]
-        return PhotonCounts.from_events(k, l, i, j, n, self.setup.grid, cfa=self.recipe.cfa)
+        return PhotonCounts.from_events(k, l, i, j, n, self.capture.grid, cfa=self.recipe.cfa)
 
     @cached_property
     def known(self) -> Sections:
@@ -107,7 +107,7 @@ class World:
     @cached_property
     def planes(self) -> FocalPlanes:
         """Sixteen planes between the ends of the recipe's range."""
-        return FocalPlanes.at_depths(self.setup.grid, np.linspace(450, 750, 16))
+        return FocalPlanes.at_depths(self.capture.grid, np.linspace(450, 750, 16))
 
     def made(self, name: str, reuse: Reuse | None = None, **products: object) -> Path:
         """A new dataset of the recipe with other products; the folder must not exist yet."""
@@ -140,21 +140,21 @@ def _sums(sections: Sections) -> Arrays:
 
 def _of_dense(world: World, images: np.ndarray, share: float) -> Arrays:
     """Sections of dense counts, added as images if more than this share of the pixels has photons."""
-    counts = PhotonCounts.from_dense(images, world.setup.grid, cfa=world.recipe.cfa)
+    counts = PhotonCounts.from_dense(images, world.capture.grid, cfa=world.recipe.cfa)
     with patch.object(reconstruction, "DENSE_SHARE", share):
         return _sums(reconstruct(counts, world.planes))
 
 
 def _visible(world: World, *, tests_all: bool) -> Arrays:
-    hits = first_hits_at_centre(world.scene, world.setup.grid)
+    hits = first_hits_at_centre(world.scene, world.capture.grid)
     if not tests_all:
-        return {"views": visible_views(world.scene, world.setup.grid, hits)[0]}
+        return {"views": visible_views(world.scene, world.capture.grid, hits)[0]}
     with patch.object(first_hits, "_can_be_blocked", lambda _, __, start: np.ones(len(start), bool)):
-        return {"views": visible_views(world.scene, world.setup.grid, hits)[0]}
+        return {"views": visible_views(world.scene, world.capture.grid, hits)[0]}
 
 
-def _drawn(world: World, explored: Exploration | None) -> Arrays:
-    return dict(thin_photons(world.setup, world.recipe.photons, seed=3, explored=explored)[0].columns())
+def _drawn(world: World, explored: Plan | None) -> Arrays:
+    return dict(thin_photons(world.capture, explored)[0].columns())
 
 
 def _mosaics(folder: Path, cfa: str | None) -> Arrays:
@@ -167,9 +167,9 @@ def _mosaics(folder: Path, cfa: str | None) -> Arrays:
 
 
 def _dense(world: World) -> Arrays:
-    views = range(world.setup.grid.view_count)
+    views = range(world.capture.grid.view_count)
     rng = np.random.default_rng(3)
-    mosaics = [rendered_mosaic(world.setup, view, 16, 1 + view) for view in views]
+    mosaics = [rendered_mosaic(world.capture, view, 16, 1 + view) for view in views]
     return {
         "n": np.array([drawn_counts(m, world.recipe.cfa, world.recipe.photons.budget, rng) for m in mosaics])
     }

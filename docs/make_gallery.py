@@ -37,7 +37,7 @@ def page() -> str:
         recipes.setdefault(recipe.scene, []).append(f"`{file.stem}`")
     parts = [HEAD]
     for name in scene_names():
-        scene, _ = load_scene(str(SCENES / name))
+        scene = load_scene(str(SCENES / name))
         purpose = " ".join(scene.description.split())
         made = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
         parts.append(f"## {name}\n\n{purpose}{made}\n\n![{scene.title}](gallery/{name}.jpg)\n")

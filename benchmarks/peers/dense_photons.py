@@ -3,15 +3,17 @@
 import numpy as np
 
 from pcii.types.photon_limit import Light, photon_rates, scope_energies, sense
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.renderer.radiance import render_view
 
 
-def rendered_mosaic(setup: Setup, view: int, samples_per_pixel: int, seed: int) -> np.ndarray:
+def rendered_mosaic(capture: Capture, view: int, samples_per_pixel: int, seed: int) -> np.ndarray:
     """Radiance (H, W) that each pixel of a view sees in its own colour."""
-    k, l = divmod(view, setup.grid.cols)
-    image = render_view(setup.render_scene, setup.grid, k, l, samples_per_pixel=samples_per_pixel, seed=seed)
-    return sense(image, setup.cfa)
+    k, l = divmod(view, capture.grid.cols)
+    image = render_view(
+        capture.render_scene, capture.grid, k, l, samples_per_pixel=samples_per_pixel, seed=seed
+    )
+    return sense(image, capture.cfa)
 
 
 def drawn_counts(mosaic: np.ndarray, cfa: str | None, budget: float, rng: np.random.Generator) -> np.ndarray:

@@ -4,6 +4,7 @@ Dense views are timed on a few views and scaled to all, since each costs the sam
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from benchmarks.figures import bars, curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Row, Size, Study, Value
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.types.camera_grid import CameraGrid
 from simgen.photons.thinning import thin_photons
@@ -48,21 +49,22 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dic
         FINER: load_recipe("paper", film(4 * side_px))[0],
         BRIGHTER: load_recipe("paper", [*film(side_px), "photons.budget=10000"])[0],
     }
-    setups = {name: setup_of(recipe) for name, recipe in recipes.items()}
-    setup, photons, logs = setups[BASE], recipes[BASE].photons, dict[str, dict[str, Any]]()
+    captures = {name: capture_of(recipe) for name, recipe in recipes.items()}
+    capture, logs = captures[BASE], dict[str, dict[str, Any]]()
 
     def thin(name: str, seed: int) -> None:
-        logs[name] = thin_photons(setups[name], recipes[name].photons, seed=seed)[1]
+        logs[name] = thin_photons(replace(captures[name], seed=seed))[1]
 
     def render(samples: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
         for view in range(dense_views):
-            drawn_counts(rendered_mosaic(setup, view, samples, seed), setup.cfa, photons.budget, rng)
+            mosaic = rendered_mosaic(capture, view, samples, seed)
+            drawn_counts(mosaic, capture.cfa, capture.photons.budget, rng)
 
     works = {name: partial(thin, name) for name in recipes}
     works |= {dense_name(samples): partial(render, samples) for samples in (1, 16)}
     seconds = side_by_side(works, repeats)
-    scale = setup.grid.view_count / dense_views
+    scale = capture.grid.view_count / dense_views
     rows: list[Row] = []
     for name, taken in seconds.items():
         values = {"time_ms": median_of(taken, 1e3 * (scale if name.startswith(DENSE) else 1))}
@@ -77,7 +79,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dic
         )
         for samples in (1, 16)
     }
-    return [*rows, *_costs(seconds, scale, setup.grid)], ratios
+    return [*rows, *_costs(seconds, scale, capture.grid)], ratios
 
 
 def dense_name(samples: int) -> str:
@@ -105,9 +107,10 @@ def _growth(side_px: int, repeats: int, most: int) -> list[Row]:
     recipes = {
         10**n: load_recipe("paper", [*small, f"photons.budget={10**n}"])[0] for n in range(1, most + 1)
     }
-    setup = setup_of(recipes[10])
+    capture = capture_of(recipes[10])
     works = {
-        n: lambda seed, own=own: thin_photons(setup, own.photons, seed=seed) for n, own in recipes.items()
+        n: lambda seed, own=own: thin_photons(replace(capture, photons=own.photons, seed=seed))
+        for n, own in recipes.items()
     }
     return [
         Row(

@@ -5,7 +5,7 @@ draws Poisson counts from them. Scenes from matt to glass, whose paths differ ev
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +13,11 @@ import numpy as np
 from benchmarks.figures import curve, frame
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import Photons, load_recipe
+from simgen.spec.recipe import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,14 +70,14 @@ def measure(
     ratios: dict[str, Value] = {}
     for scene, name in SCENES.items():
         recipe, _ = load_recipe(name, [*VIEWS, *film(side_px)])
-        setup = setup_of(recipe)
-        rates = true_rates(setup, reference)
+        capture = capture_of(recipe)
+        rates = true_rates(capture, reference)
         for budget in budgets:
             photons = recipe.photons.model_copy(update={"budget": budget})
-            seconds, counts = compared(setup, photons, (0, *samples), repeats)
+            seconds, counts = compared(replace(capture, photons=photons), (0, *samples), repeats)
             for number, taken in seconds.items():
                 where = {"scene": scene, "samples": number, "photons_per_view": budget}
-                values = {"time_ms": median_of(taken, 1e3 / setup.grid.view_count)}
+                values = {"time_ms": median_of(taken, 1e3 / capture.grid.view_count)}
                 values |= distances(counts[number], rates, budget)
                 rows.append(Row(DISTANCES, DENSE if number else THINNING, where, values))
             if budget == USUAL:
@@ -88,40 +88,38 @@ def measure(
 
 
 def compared(
-    setup: Setup, photons: Photons, ways: Sequence[int], repeats: int
+    capture: Capture, ways: Sequence[int], repeats: int
 ) -> tuple[dict[int, list[float]], dict[int, np.ndarray]]:
     """Seconds and counts (R, V, H, W) of each way, which is its samples per pixel, or 0 for thinning."""
     counts: dict[int, list[np.ndarray]] = {samples: [] for samples in ways}
     works = {
-        samples: lambda seed, samples=samples: counts[samples].append(
-            counts_of(setup, photons, samples, seed)
-        )
+        samples: lambda seed, samples=samples: counts[samples].append(counts_of(capture, samples, seed))
         for samples in ways
     }
     return side_by_side(works, repeats), {samples: np.array(found[1:]) for samples, found in counts.items()}
 
 
-def counts_of(setup: Setup, photons: Photons, samples: int, seed: int) -> np.ndarray:
+def counts_of(capture: Capture, samples: int, seed: int) -> np.ndarray:
     """Counts (V, H, W) by dense rendering with so many samples per pixel, by thinning with 0."""
-    grid = setup.grid
+    grid, budget = capture.grid, capture.photons.budget
     if not samples:
-        table, _ = thin_photons(setup, photons, seed=seed)
+        table, _ = thin_photons(replace(capture, seed=seed))
         size = grid.view_count * grid.height * grid.width
         flat = np.bincount(table.flat_pixels(grid), weights=table.n, minlength=size)
         return flat.reshape(grid.view_count, grid.height, grid.width)
-    rng = np.random.default_rng([seed, int(photons.budget)])
+    rng = np.random.default_rng([seed, int(budget)])
     seeds = [1 + seed * grid.view_count + view for view in range(grid.view_count)]
-    mosaics = [rendered_mosaic(setup, view, samples, own) for view, own in enumerate(seeds)]
-    return np.array([drawn_counts(mosaic, setup.cfa, photons.budget, rng) for mosaic in mosaics])
+    mosaics = [rendered_mosaic(capture, view, samples, own) for view, own in enumerate(seeds)]
+    return np.array([drawn_counts(mosaic, capture.cfa, budget, rng) for mosaic in mosaics])
 
 
-def true_rates(setup: Setup, samples: int) -> Rates:
+def true_rates(capture: Capture, samples: int) -> Rates:
     """Rates by a long rendering in two halves, whose difference tells the noise that is left."""
-    halves = np.empty((2, setup.grid.view_count, setup.grid.height, setup.grid.width))
+    halves = np.empty((2, capture.grid.view_count, capture.grid.height, capture.grid.width))
     for half, view in np.ndindex(*halves.shape[:2]):
-        halves[half, view] = rendered_mosaic(setup, view, samples // 2, 10_000 + 100 * half + view)
+        halves[half, view] = rendered_mosaic(capture, view, samples // 2, 10_000 + 100 * half + view)
     light = halves.mean(axis=(0, 2, 3), keepdims=True)
-    halves /= light * setup.grid.height * setup.grid.width
+    halves /= light * capture.grid.height * capture.grid.width
     return Rates(halves.mean(axis=0), (halves[0] - halves[1]) ** 2 / 4)
 
 

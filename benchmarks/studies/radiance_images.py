@@ -8,9 +8,9 @@ import numpy as np
 from benchmarks.figures import curve, frame
 from benchmarks.machine import has
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
-from benchmarks.scenes import film, setup_of
+from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, side_by_side
-from simgen.photons.candidates import Setup
+from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
@@ -35,11 +35,11 @@ def measure(side_px: int, samples: Sequence[int], repeats: int, reference: int) 
     """So many samples per pixel on every scene; the truth has `reference` samples."""
     rows: list[Row] = []
     for scene, recipe in SCENES.items():
-        setup = setup_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
-        truth = rendered(setup, reference, seed=10_000).astype(np.float64)
+        capture = capture_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
+        truth = rendered(capture, reference, seed=10_000).astype(np.float64)
         images: dict[int, list[np.ndarray]] = {number: [] for number in samples}
         works = {
-            number: lambda seed, own=own, n=number, setup=setup: own.append(rendered(setup, n, seed))
+            number: lambda seed, own=own, n=number, capture=capture: own.append(rendered(capture, n, seed))
             for number, own in images.items()
         }
         for number, seconds in side_by_side(works, repeats).items():
@@ -49,9 +49,9 @@ def measure(side_px: int, samples: Sequence[int], repeats: int, reference: int) 
     return Measured(rows, seeds=list(range(1, repeats + 1)))
 
 
-def rendered(setup: Setup, samples: int, seed: int) -> np.ndarray:
+def rendered(capture: Capture, samples: int, seed: int) -> np.ndarray:
     """The view (H, W, 3) with so many samples per pixel."""
-    return render_view(setup.render_scene, setup.grid, 0, 0, samples_per_pixel=samples, seed=seed)
+    return render_view(capture.render_scene, capture.grid, 0, 0, samples_per_pixel=samples, seed=seed)
 
 
 def errors(images: np.ndarray, truth: np.ndarray) -> dict[str, Value]:

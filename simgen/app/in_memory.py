@@ -17,12 +17,13 @@ from pcii.types.photon_limit import sense
 from pcii.types.truth import PhotonTruth, Truth
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
+from simgen.dataset.photon_counts import draw_from_views
 from simgen.dataset.prepared import Prepared, prepare_scene
 from simgen.dataset.rendered_views import exact_view, halved_view
 from simgen.dataset.resources import available_bytes, check_resources, in_bytes
-from simgen.photons.counting_plan import Capture, Plan
-from simgen.photons.photon_counting import draw_from_views, thin
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.photons.capture import Capture
+from simgen.photons.exploration import Plan
+from simgen.photons.thinning import thin_photons
 from simgen.sensor.detector import counts_of, detect, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import CalibrationErrors, Lens, Recipe, Sensor
@@ -61,20 +62,21 @@ def draw_photons(
     >>> counts, truth = draw_photons(load_scene("two_objects"), grid, seed=1,
     ...                              sensor={"dark_counts": 1e-4})                  # doctest: +SKIP
     """
-    own = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
+    settings = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
     values = {
-        "sensor": {"cfa": "none" if cfa is None else cfa} | own,
+        "sensor": {"cfa": "none" if cfa is None else cfa} | settings,
         "photons": {"budget": budget},
         "render": {"max_depth": max_depth},
     }
     prepared = _prepare("draw_photons", scene, grid, lens, errors, {"seed": seed, **values})
     recipe, render_scene = prepared.recipe, prepared.render_scene()
-    capture, counting = prepared.capture, prepared.plan(render_scene)
+    capture = prepared.capture(render_scene)
+    counting = prepared.plan(capture)
     check_resources(recipe, counting, Path(), prepared.map_counts)
     if counting.thins:
-        arrivals, _ = thin(capture, prepared.setup(render_scene), counting, report)
+        arrivals, _ = thin_photons(capture, counting, report)
     else:
-        arrivals = _draw_from_rendered(capture, render_scene, counting, report)
+        arrivals = _draw_from_rendered(capture, counting, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed, capture.dark_map)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
@@ -89,14 +91,12 @@ def draw_photons(
     return counts, Truth(*maps, names, photons, centre.normal, covered, unscored=unscored)
 
 
-def _draw_from_rendered(
-    capture: Capture, render_scene: RenderScene, counting: Plan, report: Report
-) -> PhotonTable:
+def _draw_from_rendered(capture: Capture, counting: Plan, report: Report) -> PhotonTable:
     """Photons where they are too many to be drawn one by one: of views that are rendered in memory."""
 
     @cache
     def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
-        image, variance = halved_view(render_scene, capture, k, l, counting.samples)
+        image, variance = halved_view(capture, k, l, counting.samples)
         return sense(image, capture.cfa), variance
 
     return draw_from_views(
@@ -136,10 +136,10 @@ def render(
             f"{in_bytes(room)} available; take fewer or smaller views"
         )
     check_resources(prepared.recipe, None, Path())
-    render_scene, capture = prepared.render_scene(), prepared.capture
+    capture = prepared.capture(prepared.render_scene())
     radiance = np.empty((*grid.shape_KLHW, 3), np.float32)
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        radiance[k, l] = exact_view(render_scene, capture, k, l, samples_per_pixel)
+        radiance[k, l] = exact_view(capture, k, l, samples_per_pixel)
         report("views", done, grid.view_count)
     return Views(radiance, grid)
 

@@ -38,7 +38,7 @@ def load_scene(
     """
     if isinstance(scene, dict):
         return scene_of(scene, None if folder is None else Path(folder), "scene")
-    return scene_lookup.load_scene(str(scene), number=number)[0]
+    return scene_lookup.load_scene(str(scene), number=number)
 
 
 def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> DatasetManifest:

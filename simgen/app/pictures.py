@@ -20,7 +20,7 @@ from pcii.store.dataset_layout import COUNTS
 from pcii.types.bayer import colours_and_samples
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.truth import Truth
-from simgen.check.scene_probe import coarser
+from simgen.cameras.rig import coarser
 from simgen.dataset.prepared import Prepared
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build

@@ -23,7 +23,7 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 def list_scenes() -> list[str]:
     """A line for each scene by name, then for those that Python functions draw."""
     drawn = [f"{name:20} Made by {package} (drawn by number)" for name, package in drawn_scenes().items()]
-    return [_line(name, lambda name: load_scene(name)[0].title) for name in scene_names()] + drawn
+    return [_line(name, lambda name: load_scene(name).title) for name in scene_names()] + drawn
 
 
 def list_recipes() -> list[str]:
@@ -54,7 +54,7 @@ def write_new_scene(name: str, source: str | None = None) -> Path:
     folder = Path("scenes") / name
     if folder.exists() or name in {*scene_names(), *drawn_scenes()}:
         raise InputError(f"NAME: {name!r} is the name of a scene already; choose another")
-    files = None if source is None else load_scene(source)[1]
+    files = None if source is None else load_scene(source).folder
     folder.parent.mkdir(exist_ok=True)
     with new_folder_safely(folder) as new:
         if files is None:

@@ -126,7 +126,7 @@ def read_mesh(path: Path) -> Triangles:
     if reader is None:
         raise InputError(f"{path}: this file is not named .ply or .obj, the kinds of mesh that are read")
     try:
-        return reader(path.read_bytes())
+        return reader(path)
     except ValueError as fault:
         raise InputError(f"{path}: this file {shorten(str(fault))}") from None
 
@@ -146,10 +146,10 @@ def ply_bytes(mesh: Triangles) -> bytes:
     return file.getvalue()
 
 
-def _read_ply(data: bytes) -> Triangles:
+def _read_ply(path: Path) -> Triangles:
     """Raises `ValueError` with the end of a sentence if there is no mesh."""
     try:
-        elements = {element.name: element.data for element in _parsed_ply(data).elements}
+        elements = {element.name: element.data for element in _parsed_ply(path).elements}
     except Exception as fault:  # a library raises whatever it likes about a broken file
         raise ValueError(f"cannot be read: {fault}") from None
     nothing = np.empty(0)
@@ -188,20 +188,20 @@ def _plyfile() -> Any:
     return plyfile
 
 
-def _parsed_ply(data: bytes) -> Any:
-    """Faces are read all at once if they are triangles, as most are."""
+def _parsed_ply(path: Path) -> Any:
+    """Faces are read all at once if they are triangles, as most are: from the file, which is mapped."""
     ply = _plyfile()
-    header = data[: data.find(b"end_header")]
+    header = path.read_bytes().partition(b"end_header")[0]
     name = next((name for name in _FACES if name.encode() in header), _FACES[0])
     if b"format ascii" not in header:
         with contextlib.suppress(ply.PlyElementParseError):  # other polygons, or a broken file
-            return ply.PlyData.read(io.BytesIO(data), known_list_len={"face": {name: 3}})
-    return ply.PlyData.read(io.BytesIO(data))
+            return ply.PlyData.read(str(path), known_list_len={"face": {name: 3}})
+    return ply.PlyData.read(str(path))
 
 
-def _read_obj(data: bytes) -> Triangles:
+def _read_obj(path: Path) -> Triangles:
     """All that is in an OBJ file as one mesh; raises `ValueError` as `obj_parts` does."""
-    return obj_parts(data, as_one=True)[1]["", ""]
+    return obj_parts(path.read_bytes(), as_one=True)[1]["", ""]
 
 
 def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tuple[str, str], Triangles]]:
@@ -246,9 +246,9 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
     owner, number_of, all_corners = np.array(owners), np.array(counts), np.array(corners).reshape(-1, 3)
     values = [np.array(one) for one in points.values()]
     parts = {}
-    for name, own in groups.items():
-        triples = all_corners[np.repeat(owner == own, number_of)]
-        parts[name] = _obj_mesh(values, triples, number_of[owner == own])
+    for name, group in groups.items():
+        triples = all_corners[np.repeat(owner == group, number_of)]
+        parts[name] = _obj_mesh(values, triples, number_of[owner == group])
     return libraries, parts
 
 
@@ -260,7 +260,8 @@ def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray)
     keys = triples @ [uv_count * normal_count, normal_count, 1]
     _, first, vertices = np.unique(keys, return_index=True, return_inverse=True)
     positions, uv, normals = (
-        one[own] if own[0] >= 0 else None for one, own in zip(values, triples[first].T, strict=True)
+        one[numbers] if numbers[0] >= 0 else None
+        for one, numbers in zip(values, triples[first].T, strict=True)
     )
     assert positions is not None
     return Triangles.checked(positions, triangulate(vertices.ravel(), counts, positions), normals, uv)

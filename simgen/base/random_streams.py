@@ -51,20 +51,17 @@ def seed_of_draw(seed: int, drawn: Any) -> int:
 
 
 def generator(
-    seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
+    seed: int, *, stage: Stage, view: int = 0, part: int = 0, round_number: int = 0
 ) -> np.random.Generator:
-    """NumPy's generator of a stage: of one view, of one part of the stage's work, of one attempt or round."""
+    """NumPy's generator of a stage: of one view, of one part of the stage's work, of one round."""
     if stage in OF_THE_CAMERAS:
         seed %= 1 << _SEED_BITS
-    key = (get_args(Stage).index(stage), view, part, attempt, round_number)
+    key = (get_args(Stage).index(stage), view, part, 0, round_number)  # the 0 keeps streams as they were
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
-def integer(
-    seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
-) -> int:
+def integer(seed: int, *, stage: Stage, view: int = 0, part: int = 0, round_number: int = 0) -> int:
     """A seed of 128 bits for light paths, of a stage as for `generator`."""
-    key = {"view": view, "part": part, "attempt": attempt, "round_number": round_number}
-    sequence = generator(seed, stage=stage, **key).bit_generator.seed_seq
-    low, high = sequence.generate_state(2, np.uint64)
+    rng = generator(seed, stage=stage, view=view, part=part, round_number=round_number)
+    low, high = rng.bit_generator.seed_seq.generate_state(2, np.uint64)
     return int(high) << 64 | int(low)

@@ -169,6 +169,11 @@ def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> Came
     )
 
 
+def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
+    """The same cameras with the same field of view on at most `side_px` pixels to a side."""
+    return with_larger_pixels(grid, max(1.0, max(grid.shape_HW) / side_px), least_px=1)
+
+
 def centre_camera(grid: CameraGrid) -> Camera:
     """The virtual centre, at X = Y = 0 between the cameras of an even grid: no errors, a pinhole."""
     return Camera(grid, np.zeros(3), np.eye(3), (0.0, 0.0), None)

@@ -15,7 +15,7 @@ from simgen.cameras.disparities import (
     shares_without,
     spread_px_mm,
 )
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts, listed
+from simgen.check.facts import Facts, Finding, ObjectFacts, listed
 
 MIN_SPREAD_PX = 2.0
 """Below this blur between nearest and farthest all of a scene is in focus at once."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from pcii.types.bayer import channel_count
 from pcii.types.readout import NEGLIGIBLE_LOSS, clipped_mean
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts
+from simgen.check.facts import Facts, Finding, ObjectFacts
 from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes, shortage
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
@@ -162,7 +162,7 @@ def seconds(facts: Facts) -> float:
     spent_s += facts.path_s * samples * pixels * grid.view_count
     if plan is not None and plan.thins:
         cost = PHOTON_COST / SAMPLE_COST if facts.is_compiled else SCALAR_PHOTON_COST / SCALAR_SAMPLE_COST
-        share = USUAL_SHARE if plan.explored is None else plan.explored.kept_share
+        share = USUAL_SHARE if plan.known_places is None else plan.kept_share
         paths_per_photon = cost * max(USUAL_SHARE / share, 1.0)
         spent_s += facts.path_s * paths_per_photon * plan.photons_per_view * grid.view_count
     return spent_s

@@ -3,10 +3,8 @@
 import itertools
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,11 +12,10 @@ from pcii.types.bayer import channel_count, colour_cells
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.disparities import apart_px
-from simgen.cameras.rig import corners, with_larger_pixels
+from simgen.cameras.rig import coarser, corners
+from simgen.check.facts import Facts, ObjectFacts
 from simgen.dataset.prepared import Prepared
 from simgen.dataset.resources import available_bytes
-from simgen.photons.counting_plan import Plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
@@ -29,112 +26,13 @@ from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
 SAMPLES = 4
-MAX_PLANE_BLUR_PX = 2.0
-"""Where a recipe names no planes, objects within this blur share one."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What was looked at, in one sentence: a verdict, the subject, the text, and what to change."""
-
-    verdict: Literal["ok", "warn", "bad"]
-    subject: str
-    text: str
-    remedy: str = ""
-
-    def line(self) -> str:
-        """The finding on one line, with its remedy after an arrow."""
-        remedy = f" -> {self.remedy}" if self.remedy else ""
-        return f"{self.verdict:<4}  {self.subject:<10}  {self.text}{remedy}"
-
-
-@dataclass(frozen=True, eq=False)
-class ObjectFacts:
-    """What the probe shows of one object.
-
-    From the virtual centre: depths `z_mm` (P,) of the pixels that see it, their share of the film, its share
-    (C,) of the light in each colour, and whether it ends at the film's border. `body_z_mm` are the nearest
-    and farthest depth of its bounding box, of what is hidden too. `corners_seeing` corner cameras see any of
-    it, and `corners_seeing_all` see it without its ending at the border of their films.
-    """
-
-    name: str
-    z_mm: np.ndarray
-    film_share: float
-    light_share: np.ndarray
-    body_z_mm: tuple[float, float]
-    corners_seeing: int = 4
-    corners_seeing_all: int = 4
-    is_cut_at_centre: bool = False
-    shines: bool = False
-    is_scored: bool = True
-
-    @cached_property
-    def middle_mm(self) -> float:
-        """Median of the depths that are seen."""
-        return float(np.median(self.z_mm))
-
-
-@dataclass(frozen=True, eq=False)
-class Facts:
-    """What the findings rest on: a recipe with its scene, a coarse look at it, and a plan of the counts.
-
-    Of the virtual centre's image: mean `luminance` in cd/m^2 (in spectral mode what its pixels see), shares
-    (C,) of its light that the pixels of each colour get, which sum to 1, and by what is no object its shares
-    (C,) of the light in each colour. `corners` is the number of corner cameras: 4, or fewer of a single row;
-    `lamps_away` are the lamps, from 1, that shine away from all objects. `plan` is None if the recipe wants
-    no counts. The probe took `path_s` for a light path and `hit_s` for a first hit.
-    """
-
-    target: Prepared
-    objects: tuple[ObjectFacts, ...]
-    corners: int
-    luminance: float
-    colour_share: np.ndarray
-    other_shares: Mapping[str, np.ndarray]
-    lamps_away: tuple[int, ...]
-    plan: Plan | None
-    path_s: float
-    hit_s: float
-    is_compiled: bool
-    memory_bytes: float
-
-    @cached_property
-    def grid(self) -> CameraGrid:
-        """The recipe's cameras."""
-        return self.target.recipe.grid.camera_grid()
-
-    @property
-    def seen(self) -> tuple[ObjectFacts, ...]:
-        """The objects that the virtual centre sees."""
-        return tuple(thing for thing in self.objects if thing.z_mm.size)
-
-    @property
-    def scored(self) -> tuple[ObjectFacts, ...]:
-        """Those of them that count in scores."""
-        return tuple(thing for thing in self.seen if thing.is_scored)
-
-    @cached_property
-    def planes_mm(self) -> tuple[float, ...]:
-        """Depths to look at: those of the recipe, else of what is scored, each in focus at one of them."""
-        planes: list[float] = []
-        for middle_mm in sorted(thing.middle_mm for thing in self.scored):
-            if not planes or apart_px(self.grid, planes[-1], middle_mm) > MAX_PLANE_BLUR_PX:
-                planes.append(float(round(middle_mm)) or middle_mm)
-        return self.target.recipe.analysis.z_mm or tuple(planes)
-
-
-def listed(names: list[str], most: int = 6) -> str:
-    """`a, b and 3 more`."""
-    text = ", ".join(names[:most])
-    return text if len(names) <= most else f"{text} and {len(names) - most} more"
 
 
 def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
-    counting_plan = target.plan(render_scene) if recipe.products.counts else None
+    plan = target.plan(target.capture(render_scene)) if recipe.products.counts else None
     side_px = SIDE_PX if is_compiled else SCALAR_SIDE_PX
     coarse = coarser(grid, side_px)
     # As many paths on a small film, or the start of a rendering would be taken for the time of its paths.
@@ -144,14 +42,38 @@ def probe_scene(target: Prepared) -> Facts:
     start_s = time.perf_counter()
     corner_hits = [first_hits_of_view(render_scene, coarse, k, l) for k, l in corners(grid)]
     hit_s = (time.perf_counter() - start_s) / (len(corner_hits) * centre.z_mm.size)
-    boxes, light = _boxes_mm(render_scene), image.sum(axis=(0, 1))
+    boxes_mm = _boxes_mm(render_scene)
     pixels = np.bincount(colour_cells(recipe.cfa).ravel(), minlength=channel_count(recipe.cfa))
-    weight = light * pixels
-    shining = {surface.number for surface in render_scene.shining}
+    weight = image.sum(axis=(0, 1)) * pixels
+    return Facts(
+        target=target,
+        objects=_object_facts(render_scene, image, centre, corner_hits, boxes_mm),
+        corners=len(corner_hits),
+        luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
+        colour_share=weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum(),
+        other_shares=_other_shares(target.scene, centre, image),
+        lamps_away=_lamps_away(target.scene, list(boxes_mm.values())),
+        plan=plan,
+        path_s=path_s,
+        hit_s=hit_s,
+        is_compiled=is_compiled,
+        memory_bytes=available_bytes(),
+    )
+
+
+def _object_facts(
+    render_scene: RenderScene,
+    image: np.ndarray,
+    centre: FirstHits,
+    corner_hits: Sequence[FirstHits],
+    boxes_mm: Mapping[int, np.ndarray],
+) -> tuple[ObjectFacts, ...]:
+    """What the picture (H, W, C) and the first hits of the virtual centre and the corners show of each."""
+    light, shining = image.sum(axis=(0, 1)), {surface.number for surface in render_scene.shining}
     objects: list[ObjectFacts] = []
     for number, name in render_scene.names.items():
         mask, views = centre.object_id == number, [hits.object_id == number for hits in corner_hits]
-        near_mm, far_mm = boxes[number][:, 2].tolist() if number in boxes else (math.inf, math.inf)
+        near_mm, far_mm = boxes_mm[number][:, 2].tolist() if number in boxes_mm else (math.inf, math.inf)
         facts = ObjectFacts(
             name=name,
             z_mm=centre.z_mm[mask].astype(np.float64),
@@ -165,25 +87,7 @@ def probe_scene(target: Prepared) -> Facts:
             is_scored=number not in render_scene.unscored,
         )
         objects.append(facts)
-    return Facts(
-        target=target,
-        objects=tuple(objects),
-        corners=len(corner_hits),
-        luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
-        colour_share=weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum(),
-        other_shares=_other_shares(target.scene, centre, image),
-        lamps_away=_lamps_away(target.scene, list(boxes.values())),
-        plan=counting_plan,
-        path_s=path_s,
-        hit_s=hit_s,
-        is_compiled=is_compiled,
-        memory_bytes=available_bytes(),
-    )
-
-
-def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
-    """The same cameras with the same field of view on at most `side_px` pixels to a side."""
-    return with_larger_pixels(grid, max(1.0, max(grid.height, grid.width) / side_px), least_px=1)
+    return tuple(objects)
 
 
 def _picture(
@@ -224,8 +128,8 @@ def _boxes_mm(render_scene: RenderScene) -> dict[int, np.ndarray]:
     """Bounding boxes (2, 3) of the objects by number, smallest and largest X, Y, Z in mm."""
     boxes_mm = shape_boxes_mm(render_scene)
     object_of_box = render_scene.object_of_shape[backend.shape_numbers(render_scene.scene)]
-    own = {number: boxes_mm[object_of_box == number] for number in set(object_of_box.tolist()) - {0}}
-    return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in own.items()}
+    parts = {number: boxes_mm[object_of_box == number] for number in set(object_of_box.tolist()) - {0}}
+    return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in parts.items()}
 
 
 def _lamps_away(scene: Scene, boxes_mm: list[np.ndarray]) -> tuple[int, ...]:

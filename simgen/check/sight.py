@@ -1,6 +1,6 @@
 """Findings on what the cameras see: objects that are cut or never seen, lamps, glass."""
 
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts, listed
+from simgen.check.facts import Facts, Finding, ObjectFacts, listed
 from simgen.spec.materials import is_clear
 
 MAX_MAGNIFICATION = 10.0
@@ -12,7 +12,7 @@ MIN_GLASS_DEPTH = 6
 def sight_findings(facts: Facts) -> list[Finding]:
     """All findings of this file."""
     by_name = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
-    findings = [finding for own in by_name.values() for finding in own]
+    findings = [finding for of_object in by_name.values() for finding in of_object]
     whole = [thing.name for thing in facts.seen if not by_name[thing.name]]
     if whole:
         findings.insert(0, Finding("ok", "objects", f"the centre and the corner cameras see {listed(whole)}"))

@@ -7,8 +7,9 @@ from pathlib import Path
 from pcii.base.errors import InputError
 from simgen.base.strict_models import suggestion
 from simgen.check.depths import depth_findings
+from simgen.check.facts import Facts, Finding
 from simgen.check.light import cost_findings, photon_findings
-from simgen.check.scene_probe import Facts, Finding, probe_scene
+from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
 from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.dataset.resources import available_bytes, shortage

@@ -3,6 +3,7 @@ from .benchmark_making import CERTIFICATE as CERTIFICATE, Definition as Definiti
 from .benchmark_making import load_definition as load_definition, make_benchmark as make_benchmark
 from .dataset_collection import generate_collection as generate_collection
 from .generation import generate as generate
+from .photon_counts import draw_from_views as draw_from_views, write_counts as write_counts
 from .prepared import Prepared as Prepared, capture_of as capture_of, prepare as prepare
 from .prepared import prepare_scene as prepare_scene
 from .rendered_views import exact_view as exact_view, halved_view as halved_view

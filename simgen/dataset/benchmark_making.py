@@ -263,10 +263,10 @@ def content_of(dataset: Dataset) -> Content:
     return content
 
 
-def compare(own: Mapping[str, Content], published: Mapping[str, Content]) -> Verdict:
+def compare(datasets: Mapping[str, Content], published: Mapping[str, Content]) -> Verdict:
     """Compare datasets by name with the published ones: their bytes, and photons where those differ."""
-    problems = [f"{name}: is not in the published benchmark" for name in own if name not in published]
-    pairs = {name: (content, published[name]) for name, content in own.items() if name in published}
+    problems = [f"{name}: is not in the published benchmark" for name in datasets if name not in published]
+    pairs = {name: (content, published[name]) for name, content in datasets.items() if name in published}
     others = {name: pair for name, pair in pairs.items() if pair[0]["sha256"] != pair[1]["sha256"]}
     tests = {name: _photons_p(*pair) for name, pair in others.items() if "tiles" in pair[0]}
     corrected = {name: min(1.0, p * len(tests)) for name, p in tests.items()}
@@ -276,7 +276,7 @@ def compare(own: Mapping[str, Content], published: Mapping[str, Content]) -> Ver
         if p < MIN_P
     ]
     least_p = min(corrected.values(), default=1.0)
-    return Verdict(len(own), len(pairs) - len(others), least_p, tuple(problems))
+    return Verdict(len(datasets), len(pairs) - len(others), least_p, tuple(problems))
 
 
 def _photons_p(ours: Content, theirs: Content) -> float:
@@ -296,12 +296,12 @@ def _photons_p(ours: Content, theirs: Content) -> float:
 
 def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
     """Compare all datasets in `out` with the published ones, and write the certificate there."""
-    own: dict[str, Content] = {}
+    contents: dict[str, Content] = {}
     collection = open_collection(out)
     for row, dataset in zip(collection.rows, collection, strict=True):
-        own[row["path"]] = content_of(dataset)
-        report("certificate", len(own), len(collection))
-    verdict = compare(own, published_certificate(file).get("datasets", {}))
+        contents[row["path"]] = content_of(dataset)
+        report("certificate", len(contents), len(collection))
+    verdict = compare(contents, published_certificate(file).get("datasets", {}))
     document = {
         "benchmark": definition.name,
         "definition_sha256": hash_json(definition.model_dump(mode="json")),
@@ -309,7 +309,7 @@ def certify(definition: Definition, file: Path, out: Path, report: Report = sile
         "backend": backend.describe(),
         "versions": versions(),
         **asdict(verdict),
-        "datasets": own,
+        "datasets": contents,
     }
     write_json_safely(out / CERTIFICATE, document)
     return verdict

@@ -26,11 +26,13 @@ from pcii.store.dataset_layout import (
 from pcii.store.folders import list_files
 from pcii.store.manifests import DatasetManifest
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
+from simgen.dataset.photon_counts import draw_from_views, write_counts
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
 from simgen.dataset.resources import check_resources
-from simgen.photons.counting_plan import Plan
-from simgen.photons.photon_counting import draw_from_views, thin, write_counts
+from simgen.photons.capture import Capture
+from simgen.photons.exploration import Plan
+from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.photon_table import PhotonTable
@@ -112,24 +114,24 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
             return read_whole(out, identity, content=True)
         check_resources(recipe, None, out, prepared.map_counts)
         with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
-            render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
+            capture = prepared.capture(reuse.once("scene", prepared.scene_key, prepared.render_scene))
         if recipe.products.counts:  # likewise: too much light
             with _timed(timings_s, "plan"):
-                counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
+                counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(capture))
                 check_resources(recipe, counting, out, prepared.map_counts)
         sweep_temporaries(out)
-        photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
+        photons = _write_products(prepared, capture, counting, reuse, out, timings_s, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
         with _timed(timings_s, "hash"):
             budgets = (None, *recipe.photons.nested)
             parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
             packed = [] if recipe.products.profile == "full" else pack_arrays(out, [TRUTH, *parts])
             files = list_files(out, [ARRAYS, TRUTH, *parts, RADIANCE])
-        manifest = _description(prepared, render_scene) | {
+        manifest = _description(prepared, capture.render_scene) | {
             "identity": identity,
             "backend": engine,
             "photons": photons,
-            "skipped": _skipped(prepared, photons, traced_for_visibility(out), render_scene),
+            "skipped": _skipped(prepared, capture, photons, traced_for_visibility(out)),
             "timings_s": timings_s,
             "files": files,
         }
@@ -142,7 +144,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
 
 def _write_products(
     prepared: Prepared,
-    render_scene: RenderScene,
+    capture: Capture,
     counting: Plan | None,
     reuse: Reuse,
     out: Path,
@@ -150,7 +152,7 @@ def _write_products(
     report: Report,
 ) -> dict[str, Any] | None:
     """Write all products; what the manifest says of the photons, None without counts."""
-    recipe, capture, photons = prepared.recipe, prepared.capture, None
+    recipe, photons = prepared.recipe, None
     products, sensor = recipe.products, recipe.sensor
 
     def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
@@ -159,20 +161,20 @@ def _write_products(
 
     def make_truth() -> None:
         planes_mm, has_errors = recipe.analysis.z_mm, recipe.grid.errors is not None
-        write_truth(products, planes_mm, has_errors, render_scene, capture.rig, out, report)
+        write_truth(products, planes_mm, has_errors, capture.render_scene, capture.rig, out, report)
 
     if products.truth or products.view_truth:
         with _timed(timings_s, "truth"):
             reuse.folder(prepared.truth_key, out / TRUTH, make_truth)
     if counting is not None and counting.thins:
         with _timed(timings_s, "photons"):
-            photons = write(*thin(capture, prepared.setup(render_scene), counting, report))
+            photons = write(*thin_photons(capture, counting, report))
     dense = None if counting is None or counting.thins else counting
     samples = None if dense is None else dense.samples
     views = RenderedViews(capture, sensor, recipe.exposure, products.radiance, recipe.render, samples, out)
     if products.radiance != "none" or dense is not None:
         with _timed(timings_s, "radiance"):
-            views.render(render_scene, report)
+            views.render(report)
     if dense is not None:
         with _timed(timings_s, "counts"):
             photons = write(*draw_from_views(capture, views.mosaic, views.variance, dense, report))
@@ -201,7 +203,7 @@ def _description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any
 
 
 def _skipped(
-    prepared: Prepared, photons: dict[str, Any] | None, shadow_rays: int | None, render_scene: RenderScene
+    prepared: Prepared, capture: Capture, photons: dict[str, Any] | None, shadow_rays: int | None
 ) -> list[dict[str, Any]]:
     """What was not done: what, why, and how much work that saved, and its unit.
 
@@ -226,7 +228,7 @@ def _skipped(
         what = "two of three colours of the radiance images"
         add(what, "the Bayer pattern hides them", 8 * pixels, "bytes before compression")
     has_images = products.radiance != "none" and not is_dense
-    if has_images and (saved := background_paths_saved(render_scene, prepared.capture.rig, render)):
+    if has_images and (saved := background_paths_saved(capture, render)):
         why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
         add("samples where no object can be seen", why, saved, "light paths")
     if shadow_rays is not None:

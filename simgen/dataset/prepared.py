@@ -1,7 +1,7 @@
 """A recipe with all that it names, and what each stage of the work takes of it."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -17,8 +17,9 @@ from simgen.base.file_lookup import asset
 from simgen.cameras.rig import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import available_bytes, shortage
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan, plan
+from simgen.photons.capture import Capture
+from simgen.photons.counting_plan import plan_counts
+from simgen.photons.exploration import Plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.detector import dark_map, photons_per_radiance, sensitivities
@@ -114,11 +115,6 @@ class Prepared:
         seed_of_errors = None if grid.errors is None else self.recipe.seed
         return hash_json([self.scene_key, grid.model_dump(mode="json"), seed_of_errors])
 
-    @cached_property
-    def capture(self) -> Capture:
-        """What decides which photons arrive where."""
-        return replace(capture_of(self.recipe, self.seed), dark_map=self.dark_map)
-
     @property
     def map_counts(self) -> float:
         """Mean number of counts that the map of dark counts adds to all views."""
@@ -127,29 +123,29 @@ class Prepared:
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
-        with ThreadPoolExecutor(1) as beside:  # the files are read by another process while this one loads
-            assets = beside.submit(read_assets, self.scene, self.folder)
+        with ThreadPoolExecutor(1) as reader:  # the files are read while the renderer loads
+            assets = reader.submit(read_assets, self.scene, self.folder)
             mi = backend.load(spectral=self.recipe.is_spectral)
             described = self.scene, self.folder, self.recipe.render.max_depth, self.curves
             return build(mi, *described, assets.result())
 
-    def setup(self, render_scene: RenderScene) -> Setup:
+    def capture(self, render_scene: RenderScene) -> Capture:
         """The scene as the recipe's cameras and sensor see it."""
-        return Setup(render_scene, self.capture.rig, self.capture.cfa, self.recipe.render.max_depth)
+        return capture_of(self.recipe, render_scene, self.seed, self.dark_map)
 
-    def plan(self, render_scene: RenderScene) -> Plan:
+    def plan(self, capture: Capture) -> Plan:
         """How the photon counts will be made, as memory is now; raises `InputError` for too many photons."""
-        setup, kind, room = self.setup(render_scene), backend.choose().kind, available_bytes()
+        kind, room = backend.choose().kind, available_bytes()
 
         def may_explore(counting: Plan) -> bool:
             return shortage(self.recipe, counting, room, self.map_counts) is None
 
-        return plan(self.capture, setup, kind, least_samples(self.recipe), may_explore=may_explore)
+        return plan_counts(capture, kind, least_samples(self.recipe), may_explore=may_explore)
 
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
     """Look up what a recipe in `recipe_folder` names; `InputError` if it is missing or wrong."""
-    scene, _ = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
+    scene = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
     return prepare_scene(recipe, scene, recipe_folder)
 
 
@@ -162,18 +158,21 @@ def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = Non
         around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
         analysis = Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
     resolved = recipe.model_copy(update={"analysis": analysis})
-    beside, grid = recipe_folder or Path(), recipe.grid.camera_grid()
-    curves = sensitivities(recipe.sensor, beside)
-    return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, beside))
+    files, grid = recipe_folder or Path(), recipe.grid.camera_grid()
+    curves = sensitivities(recipe.sensor, files)
+    return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, files))
 
 
-def capture_of(recipe: Recipe, seed: int) -> Capture:
-    """What decides which photons arrive where; `seed` is that of the draw (`Prepared.seed`)."""
+def capture_of(
+    recipe: Recipe, render_scene: RenderScene, seed: int, dark_map: np.ndarray | None = None
+) -> Capture:
+    """A scene as the recipe's cameras and sensor see it; `seed` is that of the draw (`Prepared.seed`)."""
     gain = None
     if recipe.photons.scope == "exposure":
         assert recipe.exposure is not None
         gain = photons_per_radiance(recipe.exposure, recipe.grid.pixel_mm)
-    return Capture(rig_of(recipe.grid, seed), recipe.cfa, recipe.photons, gain, seed)
+    rig = rig_of(recipe.grid, seed)
+    return Capture(render_scene, rig, recipe.cfa, recipe.photons, gain, seed, dark_map)
 
 
 def least_samples(recipe: Recipe) -> int:

@@ -15,9 +15,7 @@ from pcii.store.dataset_layout import RADIANCE, radiance_name, read_exr, write_e
 from pcii.types.bayer import channel_count, colour_index
 from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import Rig
-from simgen.photons.counting_plan import Capture
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.photons.capture import Capture
 from simgen.renderer.radiance import render_view, windows_of_objects
 from simgen.sensor.detector import full_light_image, photons_per_radiance
 from simgen.spec.recipe import Exposure, Render, Sensor
@@ -27,7 +25,6 @@ RENDERED = ".rendered"
 
 
 def exact_view(
-    render_scene: RenderScene,
     capture: Capture,
     k: int,
     l: int,
@@ -39,19 +36,17 @@ def exact_view(
     """Radiance (H, W, C), float32, of camera (k, l), with noise of its own and of this `part`."""
     seed = seeds.integer(capture.seed, view=k * capture.grid.cols + l, stage="radiance", part=part)
     samples = {"samples_per_pixel": samples_per_pixel, "background_samples": background_samples}
-    return render_view(render_scene, capture.rig, k, l, seed=seed, **samples)
+    return render_view(capture.render_scene, capture.rig, k, l, seed=seed, **samples)
 
 
-def halved_view(
-    render_scene: RenderScene, capture: Capture, k: int, l: int, samples_per_pixel: int
-) -> tuple[np.ndarray, np.ndarray]:
+def halved_view(capture: Capture, k: int, l: int, samples_per_pixel: int) -> tuple[np.ndarray, np.ndarray]:
     """Radiance (H, W, C), float32, of camera (k, l) as the mean of two halves of its samples, and its noise.
 
     It has as many samples per pixel, or one more. The noise (C,), which follows from the difference of the
     halves, is the variance of the mean in the sensor's colours, summed over the pixels of each.
     """
     samples = math.ceil(samples_per_pixel / 2)
-    halves = (exact_view(render_scene, capture, k, l, samples, part=part) for part in (0, 1))
+    halves = (exact_view(capture, k, l, samples, part=part) for part in (0, 1))
     one, other = (half.astype(np.float64) for half in halves)
     apart = sense(one - other, capture.cfa)
     colours = colour_index(apart.shape[0], apart.shape[1], capture.cfa).ravel()
@@ -59,13 +54,13 @@ def halved_view(
     return ((one + other) / 2).astype(np.float32), variance
 
 
-def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
+def background_paths_saved(capture: Capture, render: Render) -> int:
     """Light paths that all views take less than with `render.samples_per_pixel` everywhere."""
     samples, fewer = render.samples_per_pixel, render.background_samples_per_pixel
     if fewer is None:
         return 0
-    cameras = (rig.camera(k, l) for k, l in np.ndindex(rig.grid.rows, rig.grid.cols))
-    return sum(max(windows_of_objects(render_scene, each, samples, fewer)[1], 0) for each in cameras)
+    cameras = (capture.rig.camera(k, l) for k, l in np.ndindex(capture.grid.rows, capture.grid.cols))
+    return sum(max(windows_of_objects(capture.render_scene, each, samples, fewer)[1], 0) for each in cameras)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +80,7 @@ class RenderedViews:
     samples_for_counts: int | None
     out: Path
 
-    def render(self, render_scene: RenderScene, report: Report) -> None:
+    def render(self, report: Report) -> None:
         """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
         grid, stage = self.capture.grid, "views"
         if self.samples_for_counts is not None:
@@ -93,7 +88,7 @@ class RenderedViews:
         with ThreadPoolExecutor(1, "views") as writer:
             writes: list[Future[None]] = []
             for k, l in np.ndindex(grid.rows, grid.cols):
-                view = self._rendered(render_scene, k, l)
+                view = self._rendered(k, l)
                 for write in writes[-1:]:
                     write.result()
                 writes.append(writer.submit(self._write, k, l, view))
@@ -109,17 +104,15 @@ class RenderedViews:
         """Noise (C,) of a view that is on disk, as of `halved_view`."""
         return np.array(json.loads(self._noise_file(k, l).read_bytes()))
 
-    def _rendered(
-        self, render_scene: RenderScene, k: int, l: int
-    ) -> tuple[np.ndarray, np.ndarray | None] | None:
+    def _rendered(self, k: int, l: int) -> tuple[np.ndarray, np.ndarray | None] | None:
         """Radiance of a view and, if counts are drawn from it, its noise; None if they are on disk."""
         samples, settings = self.samples_for_counts, self.settings
         if self._exact_file(k, l).is_file() and (samples is None or self._noise_file(k, l).is_file()):
             return None
         if samples is not None:
-            return halved_view(render_scene, self.capture, k, l, samples)
+            return halved_view(self.capture, k, l, samples)
         both = settings.samples_per_pixel, settings.background_samples_per_pixel
-        return exact_view(render_scene, self.capture, k, l, *both), None
+        return exact_view(self.capture, k, l, *both), None
 
     def _write(self, k: int, l: int, view: tuple[np.ndarray, np.ndarray | None] | None) -> None:
         """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import layers_for, tile_px_for
-from simgen.photons.exploration import MAX_RAYS
+from simgen.photons.exploration import MAX_RAYS, Plan
 from simgen.spec.recipe import Recipe
 
 BASE_BYTES = 4e8

@@ -79,8 +79,8 @@ class GltfFile:
         number = view.buffer
         if number not in self._buffers:
             uri = self.item(self.document.buffers, number, "buffers").uri
-            own = np.frombuffer(b"" if number else self.binary, np.uint8)
-            self._buffers[number] = own if uri is None else self.content(uri, f"buffers[{number}]")
+            binary = np.frombuffer(b"" if number else self.binary, np.uint8)
+            self._buffers[number] = binary if uri is None else self.content(uri, f"buffers[{number}]")
         return self._buffers[number][view.byte_offset :][: view.byte_length], view.byte_stride
 
     def picture(self, index: int) -> np.ndarray:

@@ -117,5 +117,5 @@ def _joined(corners: np.ndarray) -> Triangles:
         raise ValueError("has no faces, or one that is no triangle")
     if len(corners) > MOST_VERTICES:
         raise ValueError(f"has more than {MOST_VERTICES // 3} triangles")
-    places, vertices = np.unique(corners, axis=0, return_inverse=True)
-    return Triangles.checked(places.astype(np.float64), vertices.reshape(-1, 3), None, None)
+    positions, vertices = np.unique(corners, axis=0, return_inverse=True)
+    return Triangles.checked(positions.astype(np.float64), vertices.reshape(-1, 3), None, None)

@@ -1,4 +1,4 @@
-"""Photon counts: by thinning a majorant, or from rendered views, and which of the two."""
+"""Photons one by one: thinned from a majorant, and when counts are drawn from rendered views instead."""
 
 import lazy_loader
 

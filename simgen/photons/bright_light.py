@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, FilmPoints, Setup, is_on_film, nothing
+from simgen.photons.candidates import CandidateSampler, FilmPoints, is_on_film, nothing
+from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.emission_sampler import EmissionSampler, film_px, image_px_per_mm2
 from simgen.renderer.light_tracing import Arrivals, LampTracer
@@ -86,38 +87,38 @@ def brightest_that_matters(film_light: float, paths: float, pixels: int) -> floa
     return LEAST_SHARE * film_light * paths / (SURE_HITS * pixels)
 
 
-def straight_light(setup: Setup) -> list[BrightLight]:
+def straight_light(capture: Capture) -> list[BrightLight]:
     """What comes straight from surfaces that are drawn from: all that shines, unless a medium lies between.
 
     A picture has a row for each octave of its brightness, so that a bright spot counts apart from the rest.
     """
-    emission = EmissionSampler(setup)
-    if not emission.mass or setup.render_scene.why_rendered:
+    emission = EmissionSampler(capture)
+    if not emission.mass or capture.render_scene.why_rendered:
         return []
     rng = seeds.generator(SEED, stage="aimed pilot", part=2)
-    arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % setup.grid.view_count, rng)
+    arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % capture.grid.view_count, rng)
     light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
     rows = _rows(arriving.surface[None], light, arriving.radiance)
-    names = [_name(setup, number) for number in emission.numbers.tolist()]
+    names = [_name(capture, number) for number in emission.numbers.tolist()]
     return [
         BrightLight.of(names[arriving.surface[row[0]]], light[row], arriving.radiance[row]) for row in rows
     ]
 
 
 def mirrored_light(
-    setup: Setup, film_light: float, paths: float, *, with_straight: bool
+    capture: Capture, film_light: float, paths: float, *, with_straight: bool
 ) -> list[BrightLight]:
     """What mirrors and glass send to the cameras first, of lamps so bright that `paths` may not meet it.
 
     `film_light` is the sum of radiance over a film as it is known. With `with_straight` also what comes
     straight from lamps that `straight_light` does not know.
     """
-    grid, z_mm = setup.grid, setup.coarse_z_mm
+    grid, z_mm, render_scene = capture.grid, capture.coarse_z_mm, capture.render_scene
     depth_mm = float(np.median(z_mm[np.isfinite(z_mm)])) if np.isfinite(z_mm).any() else 0.0
-    reach_mm = float(np.linalg.norm(setup.rig.position_mm[..., :2], axis=-1).max())
+    reach_mm = float(np.linalg.norm(capture.rig.position_mm[..., :2], axis=-1).max())
     disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm, MIN_DISC_MM)
-    tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, disc_mm)
-    known = set() if setup.render_scene.why_rendered else {one.number for one in setup.render_scene.shining}
+    tracer = LampTracer(render_scene, capture.rig, capture.cfa, disc_mm)
+    known = set() if render_scene.why_rendered else {one.number for one in render_scene.shining}
     is_known = np.array([number in known for number in tracer.objects], dtype=bool)
     if not (tracer.has_mirrors or (with_straight and not is_known.all())):
         return []
@@ -128,20 +129,20 @@ def mirrored_light(
     if not lamps.size:
         return []
     is_searched = ~is_known & with_straight
-    if setup.render_scene.hides_surroundings:
+    if render_scene.hides_surroundings:
         is_searched &= np.array(tracer.objects) >= 0
     arrivals, result = _arrivals(tracer, lamps, is_searched, film_light, least_radiance), []
     if arrivals.light.sum() <= LEAST_SHARE * film_light:
         return []
     kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
     for row in _rows(kinds, arrivals.light, arrivals.radiance):
-        own, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
-        name = _name(setup, tracer.objects[lamp])
-        if own.bounces.any():
-            clear = setup.render_scene.names.get(int(np.bincount(own.object_id).argmax()))
+        alike, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
+        name = _name(capture, tracer.objects[lamp])
+        if alike.bounces.any():
+            clear = capture.render_scene.names.get(int(np.bincount(alike.object_id).argmax()))
             name += " through what is no object" if clear is None else f" through '{clear}'"
-        seen = BrightLight.of(name, own.light, own.radiance)
-        result.append(seen if is_scattered else seen._replace(arrivals=own, bounces=bounces))
+        seen = BrightLight.of(name, alike.light, alike.radiance)
+        result.append(seen if is_scattered else seen._replace(arrivals=alike, bounces=bounces))
     return result
 
 
@@ -173,20 +174,21 @@ def _arrivals(
 
 
 def lit_light(
-    setup: Setup, sampler: CandidateSampler, film_light: float, paths: float
+    sampler: CandidateSampler, film_light: float, paths: float
 ) -> tuple[list[BrightLight], Samples]:
     """Places that a lamp at a point lights, as a spot lamp its dot, so bright that `paths` may not meet them;
     and paths through these places."""
-    tracer = LampTracer(setup.render_scene, setup.rig, setup.cfa, setup.max_depth, 0.0)
-    least_radiance = brightest_that_matters(film_light, paths, setup.grid.height * setup.grid.width)
-    rows, seen = list[BrightLight](), [nothing(setup.channels).exceeding]
-    for places in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
-        view = np.arange(places.area_mm2.size) % setup.grid.view_count
-        k, l = np.divmod(view, setup.grid.cols)
-        away_mm = places.point_mm - setup.rig.position_mm[k, l]
-        row, col, z_mm = film_px(setup.rig, view, away_mm, np.zeros((2, 1)))
-        image_px = places.area_mm2 * image_px_per_mm2(setup.rig, places.normal, away_mm, z_mm)
-        here = np.flatnonzero(is_on_film(setup.grid, row + 0.5, col + 0.5) & (image_px > 0))
+    capture = sampler.capture
+    tracer = LampTracer(capture.render_scene, capture.rig, capture.cfa, 0.0)
+    least_radiance = brightest_that_matters(film_light, paths, capture.grid.height * capture.grid.width)
+    rows, seen = list[BrightLight](), [nothing(capture.channels).exceeding]
+    for lit in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
+        view = np.arange(lit.area_mm2.size) % capture.grid.view_count
+        k, l = np.divmod(view, capture.grid.cols)
+        away_mm = lit.point_mm - capture.rig.position_mm[k, l]
+        row, col, z_mm = film_px(capture.rig, view, away_mm, np.zeros((2, 1)))
+        image_px = lit.area_mm2 * image_px_per_mm2(capture.rig, lit.normal, away_mm, z_mm)
+        here = np.flatnonzero(is_on_film(capture.grid, row + 0.5, col + 0.5) & (image_px > 0))
         if not here.size:
             continue
         points = FilmPoints(view[here], row[here] + 0.5, col[here] + 0.5)
@@ -210,9 +212,9 @@ def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterato
     return (np.flatnonzero(row.ravel() == number) for number in range(row.max(initial=-1) + 1))
 
 
-def _name(setup: Setup, number: int) -> str:
+def _name(capture: Capture, number: int) -> str:
     """What an object, or 0 for a lamp of the scene and -1 for what is all around, is called in messages."""
-    name = setup.render_scene.names.get(number)
+    name = capture.render_scene.names.get(number)
     if name is None:
         return "the surroundings" if number < 0 else "a lamp"
     return f"'{name}'"

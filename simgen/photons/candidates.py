@@ -5,22 +5,18 @@ other.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.types.bayer import channel_count, colour_cells
+from pcii.types.bayer import colour_cells
 from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import Cameras, Rig, as_rig, corners, with_larger_pixels
+from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
-from simgen.renderer.mitsuba_scene import RenderScene, not_finite
+from simgen.renderer.mitsuba_scene import not_finite
 from simgen.sensor.photon_table import PhotonTable, no_photons
-from simgen.truth.first_hits import first_hits_of_view
 
 
 class ImageCells(NamedTuple):
@@ -34,51 +30,6 @@ class ImageCells(NamedTuple):
     per_px: int
     number: np.ndarray
     above: float
-
-
-COARSE_PX = 64
-"""Longer side of films on which a scene is looked at first."""
-
-
-@dataclass(frozen=True)
-class Setup:
-    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments.
-
-    Paths through the film leave out what is drawn apart in `image_cells`.
-    """
-
-    render_scene: RenderScene
-    cameras: Cameras
-    cfa: str | None
-    max_depth: int
-    image_cells: ImageCells | None = None
-
-    @cached_property
-    def rig(self) -> Rig:
-        """The cameras as they really are."""
-        return as_rig(self.cameras)
-
-    @property
-    def grid(self) -> CameraGrid:
-        """The cameras as they ought to be."""
-        return self.rig.grid
-
-    @property
-    def coarse_grid(self) -> CameraGrid:
-        """The same cameras with the same field of view on few pixels."""
-        return with_larger_pixels(self.grid, max(self.grid.shape_HW) / COARSE_PX, least_px=2)
-
-    @cached_property
-    def coarse_z_mm(self) -> np.ndarray:
-        """Depths (N,) in mm that the corner cameras see on few pixels; inf where nothing is hit."""
-        coarse = self.coarse_grid
-        hits = [first_hits_of_view(self.render_scene, coarse, k, l) for k, l in corners(coarse)]
-        return np.concatenate([of_view.z_mm.ravel() for of_view in hits])
-
-    @property
-    def channels(self) -> int:
-        """Colours of the sensor's pixels: 3, or 1 for a monochrome sensor."""
-        return channel_count(self.cfa)
 
 
 class Accepted(NamedTuple):
@@ -118,11 +69,12 @@ def is_on_film(grid: CameraGrid, row: Any, col: Any) -> Any:
     return (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
 
 
-def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) -> FilmPoints:
+def even_film_points(grid: CameraGrid, number: int, seed: int) -> FilmPoints:
     """About `number` points: one in each cell of a lattice over the film.
 
     Views take turns. Points come in random order, so that the first of them are spread as all are.
     """
+    rng = np.random.default_rng(seed)
     rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
     cols = max(1, round(number / rows))
     cell = rng.permutation(rows * cols)
@@ -158,7 +110,8 @@ class Candidates(NamedTuple):
 class CandidateSampler(ABC):
     """A majorant as candidates are drawn from it, in light that is guessed to be `ambient` (C,) all around.
 
-    They come of `groups` of Bayer cells (2 a + b), each candidate of one. `running` are for each group the
+    Each comes of one group of Bayer cells (`Capture.cell_groups`). What is drawn apart in `image_cells` is
+    left out. `running` are for each group the
     sums of the bounds of all pixels, in one view, up to and with those of an entry's cell; the last is their
     `mass` (G,), border tiles counted whole. With an earlier majorant `below`, of the same tiles and nowhere
     higher, what lies between the two is drawn: of the tiles that have been raised alone, and of each path the
@@ -172,19 +125,19 @@ class CandidateSampler(ABC):
 
     def __init__(
         self,
-        setup: Setup,
+        capture: Capture,
         majorant: Majorant,
-        groups: Sequence[np.ndarray],
         ambient: np.ndarray,
+        image_cells: ImageCells | None = None,
         below: Majorant | None = None,
     ) -> None:
-        self.setup, self.majorant, self.groups = setup, majorant, groups
-        self.ambient, self.below = ambient, below
+        self.capture, self.majorant, self.ambient = capture, majorant, ambient
+        self.image_cells, self.below = image_cells, below
         bound = majorant.bound * (majorant.side_px**2 / 4)[:, None]
         if below is not None:
             bound *= majorant.is_above(below)[:, None]
-        self.colours = colour_cells(setup.cfa).ravel()
-        self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in groups]
+        self.colours = colour_cells(capture.cfa).ravel()
+        self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in capture.cell_groups]
         self.mass = np.array([sums[-1] for sums in self.running])
 
     @abstractmethod
@@ -213,5 +166,5 @@ class CandidateSampler(ABC):
         wrong = np.flatnonzero(~np.isfinite(radiance))
         if wrong.size:
             k, l, row, col = (int(np.array(part)[wrong[0]]) for part in candidates[:4])
-            scene, number = self.setup.render_scene, int(object_id[wrong[0]])
-            raise InputError(not_finite(scene, number, (k, l), (row, col), self.setup.grid))
+            scene, number = self.capture.render_scene, int(object_id[wrong[0]])
+            raise InputError(not_finite(scene, number, (k, l), (row, col), self.capture.grid))

@@ -17,7 +17,8 @@ import numpy as np
 from pcii.base.srgb import LUMINANCE
 from pcii.types.bayer import colour_cells
 from simgen.cameras.rig import Rig
-from simgen.photons.candidates import Accepted, Setup, is_on_film, nothing
+from simgen.photons.candidates import Accepted, is_on_film, nothing
+from simgen.photons.capture import Capture
 from simgen.photons.shining_pieces import pieces_in_view
 from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.intersection import standing_before
@@ -74,12 +75,12 @@ class EmissionSampler:
     times px as of `CandidateSampler`; 0 if no camera can see anything that shines.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        self.setup, self.surfaces, self.mass = setup, list(_surfaces_as_sensed(setup)), 0.0
+    def __init__(self, capture: Capture) -> None:
+        self.capture, self.surfaces, self.mass = capture, list(_surfaces_as_sensed(capture)), 0.0
         self.numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
         self.is_ball = np.array([one.ball is not None for one in self.surfaces])
         if self.surfaces:
-            self.pieces = pieces_in_view(self.surfaces, setup.rig)
+            self.pieces = pieces_in_view(self.surfaces, capture.rig)
             self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
             self.mass = float(self.running[-1]) if self.running.size else 0.0
 
@@ -91,32 +92,34 @@ class EmissionSampler:
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
         light = self.arriving(view, np.random.default_rng(seed))
-        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
+        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
         light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
-        k, l = np.divmod(view[light.candidate], self.setup.grid.cols)
+        k, l = np.divmod(view[light.candidate], self.capture.grid.cols)
         origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
         photons = PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin)
-        return nothing(self.setup.channels)._replace(photons=photons, candidate=light.candidate)
+        return nothing(self.capture.channels)._replace(photons=photons, candidate=light.candidate)
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
         """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
         points, chance = self.film_points(view, rng), rng.random(view.size)
         row, col = np.floor(points.row_px + 0.5), np.floor(points.col_px + 0.5)
-        which = np.flatnonzero(is_on_film(self.setup.grid, row, col) & (points.sent > 0))
+        which = np.flatnonzero(is_on_film(self.capture.grid, row, col) & (points.sent > 0))
         points, row, col = points.take(which), row[which].astype(np.int64), col[which].astype(np.int64)
-        colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
+        colour = colour_cells(self.capture.cfa).ravel()[row % 2 * 2 + col % 2]
         radiance = self._radiance(points)[np.arange(which.size), colour]
         is_kept = chance[which] * points.bound < points.sent * radiance
         light = Arriving(which, row, col, points.surface, radiance, points.point_mm[:, 2]).take(is_kept)
         points = points.take(is_kept)
-        blocker = standing_before(self.setup.render_scene, points.camera_mm, points.point_mm, SHADOW_EPSILON)
+        blocker = standing_before(
+            self.capture.render_scene, points.camera_mm, points.point_mm, SHADOW_EPSILON
+        )
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
         is_itself = self.is_ball[light.surface] & (blocker == self.numbers[light.surface])
         return light.take((blocker < 0) | is_itself)
 
     def film_points(self, view: np.ndarray, rng: np.random.Generator) -> ShiningPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""
-        rig = self.setup.rig
+        rig = self.capture.rig
         piece = np.searchsorted(self.running, rng.random(view.size) * self.mass, side="right")
         piece = np.minimum(piece, self.running.size - 1)
         across, along = np.sqrt(rng.random(view.size)), rng.random(view.size)
@@ -138,7 +141,7 @@ class EmissionSampler:
             x, y, z = (normal[here] @ axes).T
             east, north = np.arctan2(x, -z), np.arcsin(np.clip(-y, -1, 1))
             texcoord[here] = np.stack([(east / np.pi + 1) / 2, north / np.pi + 0.5], axis=1)
-        k, l = np.divmod(view, self.setup.grid.cols)
+        k, l = np.divmod(view, self.capture.grid.cols)
         camera_mm, lens_point = rig.position_mm[k, l], np.zeros((2, 1))
         if rig.lens is not None:
             lens_point = rig.lens_points(rng.random((2, view.size)))
@@ -146,8 +149,8 @@ class EmissionSampler:
         away_mm = point_mm - camera_mm
         row_px, col_px, z_mm = film_px(rig, view, away_mm, lens_point)
         sent = stretch * image_px_per_mm2(rig, normal, away_mm, z_mm)
-        places = surface, point_mm, camera_mm, texcoord, row_px, col_px
-        return ShiningPoints(*places, sent, self.pieces.bound[piece])
+        points = surface, point_mm, camera_mm, texcoord, row_px, col_px
+        return ShiningPoints(*points, sent, self.pieces.bound[piece])
 
     def _radiance(self, points: ShiningPoints) -> np.ndarray:
         """Radiance (N, C) of points of surfaces, in the sensor's colours."""
@@ -185,14 +188,14 @@ def image_px_per_mm2(rig: Rig, normal: np.ndarray, away_mm: np.ndarray, z_mm: np
     return np.nan_to_num(scale_px**2 * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3)
 
 
-def _surfaces_as_sensed(setup: Setup) -> Iterator[ShiningSurface]:
+def _surfaces_as_sensed(capture: Capture) -> Iterator[ShiningSurface]:
     """What shines in the colours of the sensor: luminance alone for a monochrome one."""
 
     def sensed(values: np.ndarray) -> np.ndarray:
-        has_colours = setup.render_scene.filters is not None or setup.cfa is not None
+        has_colours = capture.render_scene.filters is not None or capture.cfa is not None
         return values if has_colours else (values @ LUMINANCE)[..., None]
 
-    for one in setup.render_scene.shining:
+    for one in capture.render_scene.shining:
         if one.picture is None:
             yield replace(one, radiance=sensed(one.radiance))
         else:

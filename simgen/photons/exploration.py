@@ -1,44 +1,31 @@
 """What is found out about a scene's light before photons are drawn: the majorant, and what it keeps.
 
 It depends on scene, cameras and photons wanted, not on the seed: datasets that differ in nothing else share
-it. A pilot of few paths suggests the majorant; then candidates are drawn for nothing but to lift it where it
+it. A pilot of few paths suggests the majorant; then candidates are drawn for nothing but to raise it where it
 is exceeded, until a rehearsal, with as many candidates as the draw needs, rarely exceeds it. Where mirrors
 reflect light onto other surfaces no majorant may suffice. What is learned here costs no photon its
 independence.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.bright_light import (
-    LEAST_SHARE,
-    SURE_HITS,
-    BrightLight,
-    lit_light,
-    mirrored_light,
-)
-from simgen.photons.candidates import (
-    Accepted,
-    CandidateSampler,
-    FilmPoints,
-    ImageCells,
-    Setup,
-    even_film_points,
-)
+from simgen.photons.bright_light import LEAST_SHARE, SURE_HITS, BrightLight, lit_light, mirrored_light
+from simgen.photons.candidates import Accepted, CandidateSampler, FilmPoints, ImageCells, even_film_points
+from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
 from simgen.photons.emission_sampler import EmissionSampler, film_px
 from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.mirror_images import KnownPlaces, MirrorImages, find_images
 from simgen.photons.scalar_sampler import ScalarSampler
-from simgen.photons.scopes import Scopes
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.renderer.backend import is_scalar
 from simgen.renderer.path_tracing import bright_directions, surrounding_radiance
 from simgen.renderer.wavelengths import light_of
-from simgen.spec.recipe import Photons
 
 EXPLORATION_SEED = 0
 """What is found before photons are drawn decides their cost, not where they fall: with one seed for all,
@@ -79,8 +66,6 @@ MEAN_OF = 4
 """Rehearsals end if the first is within `MAX_MISSING_SD`, or else the mean of this many is: of light in rare
 paths one of them may have met little by chance. If neither is so, views are rendered."""
 MAX_REACH_TILES = 4
-EXCESS_SHARE = 1e-5
-"""Share of the light that the warm-up leaves above the majorant."""
 KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
 MIN_KEPT_SHARE = 1e-4
@@ -95,112 +80,149 @@ RARE = "light in rare paths, as by mirrors,"
 """What rehearsals find above the bounds, whatever it is."""
 
 
-@dataclass(frozen=True, eq=False)
-class Exploration:
-    """A majorant, ambient light (C,), the share of candidates that is kept, and the light paths it took.
+@dataclass(frozen=True)
+class Plan:
+    """How the photon counts of a capture will be made, and what is known of its light.
 
-    `majorant` is None if there is no light but what comes straight from something that shines; copy it before
-    raising bounds. `is_bounded` is False if paths exceed every majorant too often: no thinning then.
-    `excess_share` is the share of the light that lay above the bounds in the last rehearsal. `aimed_at` is
-    bright light that few paths meet: places that the pilot was aimed at, and images of lamps that are drawn
-    apart, in `image_cells`. `unmet` is what no path can be aimed at, or what rehearsals found above every
-    bound.
+    What follows `paths` is known once the light was explored, if photons are thinned: see `explore`.
     """
+
+    thins: bool
+    """Whether photons are drawn one by one; else counts are drawn from rendered views."""
+    samples: int
+    """Samples per pixel of the dense views that the counts are drawn from, or would need at least."""
+    photons_per_view: float
+    keeps_origins: bool = True
+    """Whether photons are few enough to be kept one by one, each with its origin, if they are thinned."""
+    why_rendered: str = ""
+    """A clause on why photons cannot be thinned, whatever that costs; "" if they could be."""
+    noise: float = 0.0
+    """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
+    normaliser_error: float = 0.0
+    """Standard error of the light that a dense view's budget is divided by, as a share of it."""
+    depths_mm: tuple[float, ...] = ()
+    """Some of the depths that the corner cameras see, if photons are thinned."""
+    bright_light: tuple[BrightLight, ...] = ()
+    """Bright light that few paths meet: what photons are aimed at, or what the forecast of rendered views
+    counts in. Of an exploration after which photons cannot be thinned, what stands in the way."""
+    paths: int = 0
+    """Light paths that the exploration took."""
+    known_places: KnownPlaces | None = field(default=None, compare=False)
+    """What shines in view, and images of lamps that are drawn apart; None before the exploration."""
+    majorant: Majorant | None = field(default=None, compare=False)
+    """None if there is no other light than that of known places; copy it before its bounds are raised."""
+    ambient: np.ndarray = field(default_factory=lambda: np.zeros(1), compare=False)
+    """Light (C,) that is guessed to come from all around."""
+    kept_share: float = KEPT_SHARE_GUESS
+    """Share of the candidates that is kept."""
+    excess_share: float = 0.0
+    """Share of the light that lay above the bounds in the last rehearsals."""
+
+    @property
+    def image_cells(self) -> ImageCells | None:
+        """Cells of the films that paths leave out, since images of lamps are drawn there apart."""
+        return None if self.known_places is None else self.known_places.image_cells
+
+
+class _Pilot(NamedTuple):
+    """What the pilot shows: the majorant that it suggests and what is drawn apart, as of `Plan`; bright light
+    that paths were aimed at, and such as no path can be aimed at; the mean radiance (C,) of all views."""
 
     majorant: Majorant | None
     known_places: KnownPlaces
+    aimed_at: list[BrightLight]
+    unmet: list[BrightLight]
     ambient: np.ndarray
+    mean: np.ndarray
     paths: int
-    kept_share: float = KEPT_SHARE_GUESS
-    is_bounded: bool = True
-    excess_share: float = 0.0
-    image_cells: ImageCells | None = None
-    aimed_at: tuple[BrightLight, ...] = ()
-    unmet: tuple[BrightLight, ...] = ()
 
 
-def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
-    """The majorant for as many photons; see `thin_photons` for the arguments and for what is raised.
+def explore(capture: Capture, plan: Plan | None = None) -> Plan:
+    """The plan with what its photons are drawn from; not `thins` if no majorant holds.
 
     A first pilot of few rays measures the mean radiance. A second, also spread evenly, finds the surfaces;
     tiles are so large that each holds several of its rays. Others are aimed at what is known to be bright.
-    Then the majorant is warmed up and rehearsed.
+    Then the majorant is warmed up and rehearsed. The seed has no part in it. Raises `InputError` for radiance
+    that is not finite.
     """
-    scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
-    emission = EmissionSampler(setup)
-    explored, mean = _send_pilot(setup, emission, scopes, emission.mass * _kept_share(setup, emission))
-    if explored.unmet:
-        return replace(explored, is_bounded=False)
-    known, film_mass = explored.known_places, 0.0
-    direct = known.mass * _kept_share(setup, known)
-    setup = replace(setup, image_cells=explored.image_cells)
-    if explored.majorant is not None:
-        photons_wanted = scopes.expected_photons(mean)
-        explored, film_mass = _warm_up(setup, explored, explored.majorant, scopes, photons_wanted, direct)
+    pilot = _send_pilot(capture, EmissionSampler(capture))
+    photons, known, film_mass = capture.expected_photons(pilot.mean), pilot.known_places, 0.0
+    plan = plan or Plan(True, 1, photons / capture.grid.view_count)
+    if pilot.unmet:
+        return replace(plan, thins=False, bright_light=tuple(pilot.unmet))
+    plan = replace(
+        plan,
+        bright_light=tuple(pilot.aimed_at),
+        paths=pilot.paths,
+        known_places=known,
+        majorant=pilot.majorant,
+        ambient=pilot.ambient,
+    )
+    direct = known.mass * _kept_share(capture, known)
+    if pilot.majorant is not None:
+        plan, film_mass = _warm_up(capture, plan, pilot.majorant, photons, direct)
     if known.mass:
-        kept = (film_mass * explored.kept_share + direct) / (film_mass + known.mass)
-        explored = replace(explored, kept_share=max(kept, MIN_KEPT_SHARE))
-    return explored
+        kept = (film_mass * plan.kept_share + direct) / (film_mass + known.mass)
+        plan = replace(plan, kept_share=max(kept, MIN_KEPT_SHARE))
+    return plan
 
 
-def _kept_share(setup: Setup, known: EmissionSampler | MirrorImages | KnownPlaces) -> float:
+def _kept_share(capture: Capture, known: EmissionSampler | MirrorImages | KnownPlaces) -> float:
     """Share of the candidates of known places that is kept."""
     if not known.mass:
         return 0.0
-    view = np.arange(AIMED_RAYS) % setup.grid.view_count
+    view = np.arange(AIMED_RAYS) % capture.grid.view_count
     path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
     accepted = known.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
     return accepted.photons.k.size / AIMED_RAYS
 
 
-def sampler_class(setup: Setup) -> type[CandidateSampler]:
+def sampler_class(capture: Capture) -> type[CandidateSampler]:
     """How candidates are drawn: all at once where a compiled backend runs, else one by one."""
-    return ScalarSampler if is_scalar(setup.render_scene.mi) else WavefrontSampler
+    return ScalarSampler if is_scalar(capture.render_scene.mi) else WavefrontSampler
 
 
-def _send_pilot(
-    setup: Setup, emission: EmissionSampler, scopes: Scopes, direct: float
-) -> tuple[Exploration, np.ndarray]:
-    """Find where there is light, and how much at most; and the mean radiance (C,) of all views.
-
-    `direct` is the light of a film that comes straight from what shines.
-    """
-    surroundings = np.zeros(setup.channels)
-    if not is_scalar(setup.render_scene.mi):  # where candidates are guessed at
-        surroundings = surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
-    first, paths = _send_first_pilot(setup, surroundings)
+def _send_pilot(capture: Capture, emission: EmissionSampler) -> _Pilot:
+    """Find where there is light, and how much at most."""
+    surroundings = np.zeros(capture.channels)
+    if not is_scalar(capture.render_scene.mi):  # where candidates are guessed at
+        surroundings = surrounding_radiance(capture.render_scene, light_of(capture.render_scene, capture.cfa))
+    sampler = sampler_of_films(capture, surroundings)
+    first, paths = _send_first_pilot(sampler)
     mean = first.light.mean(axis=0)
     ambient = surroundings + AMBIENT_SHARE * mean.mean()
-    photons, sampler = scopes.expected_photons(mean), sampler_of_films(setup, ambient)
+    photons, sampler = capture.expected_photons(mean), sampler_of_films(capture, ambient)
     rays = int(np.clip(RAYS_PER_PHOTON * photons / sampler.paths_each, FIRST_RAYS, MAX_RAYS))
     followed = int(FOLLOWED_SHARE * rays)
-    film_light = float(mean.mean()) * setup.grid.height * setup.grid.width + direct
+    film_light = float(mean.mean()) * capture.grid.height * capture.grid.width
+    film_light += emission.mass * _kept_share(capture, emission)
     known_paths = first.k.size + followed, int(photons / KEPT_SHARE_GUESS)
-    found, lit = _meet_bright_light(sampler, known_paths, film_light, emission)
-    found = replace(found, ambient=ambient, paths=paths)
-    if found.image_cells is not None:  # without the light of these
-        setup = replace(setup, image_cells=found.image_cells)
-        first, more = _send_first_pilot(setup, surroundings)
-        sampler, paths, mean = sampler_of_films(setup, ambient), paths + more, first.light.mean(axis=0)
-    if not mean.any() or found.unmet:
-        return found, mean
+    known, aimed_at, unmet, lit = _meet_bright_light(sampler, known_paths, film_light, emission)
+    if known.image_cells is not None and not unmet:  # without the light of these
+        first, more = _send_first_pilot(sampler_of_films(capture, surroundings, known.image_cells))
+        sampler = sampler_of_films(capture, ambient, known.image_cells)
+        paths, mean = paths + more, first.light.mean(axis=0)
+    pilot = _Pilot(None, known, aimed_at, unmet, ambient, mean, paths)
+    if not mean.any() or unmet:
+        return pilot
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
-    samples = [first, lit, sampler.trace(_spread_evenly(setup, rays, path_seed), followed, path_seed)]
-    aimed = _aimed_points(setup, emission)
+    points = even_film_points(capture.grid, rays, path_seed)
+    samples = [first, lit, sampler.trace(points, followed, path_seed)]
+    aimed = _aimed_points(capture, emission)
     if aimed.view.size:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
         samples.append(sampler.trace(aimed, aimed.view.size, path_seed))
     contrast = float(surroundings.max() / mean.max())
-    if contrast >= MIN_CONTRAST and not setup.render_scene.hides_surroundings:
-        openings, traced = _look_for_openings(setup, sampler, Samples.joined(samples).z_mm, contrast)
+    if contrast >= MIN_CONTRAST and not capture.render_scene.hides_surroundings:
+        openings, traced = _look_for_openings(sampler, Samples.joined(samples).z_mm, contrast)
         samples.append(openings)
         paths += traced
-    known = Samples.joined(samples)
-    layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
+    seen = Samples.joined(samples)
+    layers = layers_for(capture.grid, tile_px_for(capture.grid, rays), seen.z_mm)
     paths += sampler.count_paths(rays + aimed.view.size, followed + aimed.view.size)
-    return replace(found, majorant=fit(setup.grid, layers, known, dim), paths=paths), mean
+    return pilot._replace(majorant=fit(capture.grid, layers, seen, dim), paths=paths)
 
 
 def _meet_bright_light(
@@ -208,19 +230,19 @@ def _meet_bright_light(
     known_paths: tuple[int, int],
     film_light: float,
     emission: EmissionSampler,
-) -> tuple[Exploration, Samples]:
-    """What is known of bright light that few paths meet, without a majorant yet; and paths to what is lit
-    brightly.
+) -> tuple[KnownPlaces, list[BrightLight], list[BrightLight], Samples]:
+    """What is drawn where it is known to be; bright light that few paths meet, first such as paths can be
+    aimed at and then such as matters and they cannot; and paths to what is lit brightly.
 
     `known_paths` are the numbers of paths of the pilot and of a rehearsal, `film_light` is the sum of
-    radiance over a film. Images of lamps are drawn apart, where a compiled backend runs. Light that matters
-    and of which paths of the cameras find less than lamps send is `unmet`.
+    radiance over a film. Images of lamps are drawn apart, where a compiled backend runs. Paths cannot be
+    aimed at light of which they find less than lamps send.
     """
-    setup, paths = sampler.setup, known_paths[0]
-    lit, traced = lit_light(setup, sampler, film_light, paths)
-    mirrored = mirrored_light(setup, film_light, paths, with_straight=False)
+    capture, paths = sampler.capture, known_paths[0]
+    lit, traced = lit_light(sampler, film_light, paths)
+    mirrored = mirrored_light(capture, film_light, paths, with_straight=False)
     film_light += sum(light.light for light in lit + mirrored)
-    pixels, images = setup.grid.height * setup.grid.width, None
+    pixels, images = capture.grid.height * capture.grid.width, None
     seen = [row for row in mirrored if row.arrivals is not None and row.hits(paths, pixels) < SURE_HITS]
     # What surfaces scatter a rehearsal finds as well.
     scattered, all_paths = [row for row in mirrored if row.arrivals is None], sum(known_paths)
@@ -237,21 +259,19 @@ def _meet_bright_light(
         # What the cameras see of a lamp differs from what arrives around them, but not by a half.
         hidden = [row for row in seen if found[row.bounces] < MIN_FOUND_SHARE * sent[row.bounces]]
         if sum(row.light for row in hidden) > MAX_HIDDEN_SHARE * film_light:
-            return Exploration(None, known, np.zeros(setup.channels), 0, unmet=tuple(hidden)), traced
+            return known, lit + seen, hidden, traced
     if sum(row.light for row in unmet) <= LEAST_SHARE * film_light:
         unmet = []
-    cells = None if images is None else images.cells
-    outcome = {"image_cells": cells, "aimed_at": tuple(lit + seen), "unmet": tuple(unmet)}
-    return Exploration(None, known, np.zeros(setup.channels), 0, **outcome), traced
+    return known, lit + seen, unmet, traced
 
 
-def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, int]:
+def _send_first_pilot(sampler: CandidateSampler) -> tuple[Samples, int]:
     """Paths spread evenly, more and more of them until some find light; and how many they were."""
-    sampler = sampler_of_films(setup, surroundings)
     round_number, rays, paths = 0, FIRST_RAYS, 0
     while True:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
-        samples = sampler.trace(_spread_evenly(setup, rays, path_seed), rays, path_seed)
+        points = even_film_points(sampler.capture.grid, rays, path_seed)
+        samples = sampler.trace(points, rays, path_seed)
         samples = samples.take(samples.followed)
         paths += sampler.count_paths(rays, rays)
         if samples.light.any() or rays >= sampler.max_dark_candidates:
@@ -259,40 +279,35 @@ def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, 
         round_number, rays = round_number + 1, rays * 4
 
 
-def _spread_evenly(setup: Setup, rays: int, seed: int) -> FilmPoints:
-    return even_film_points(setup.grid, rays, np.random.default_rng(seed))
-
-
-def _aimed_points(setup: Setup, emission: EmissionSampler) -> FilmPoints:
+def _aimed_points(capture: Capture, emission: EmissionSampler) -> FilmPoints:
     """Where what shines, and what is bright of the surroundings, would be seen if nothing stood before it."""
     rng, places_px = seeds.generator(EXPLORATION_SEED, stage="aimed pilot"), [np.zeros((2, 0))]
-    view = np.arange(AIMED_RAYS) % setup.grid.view_count
+    view = np.arange(AIMED_RAYS) % capture.grid.view_count
     if emission.mass:
         points = emission.film_points(view, rng)
         places_px.append(np.stack([points.row_px, points.col_px]))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=1)
-    direction = bright_directions(setup.render_scene, AIMED_RAYS, path_seed)
+    direction = bright_directions(capture.render_scene, AIMED_RAYS, path_seed)
     if len(direction):
-        places_px.append(np.stack(film_px(setup.rig, view, direction, np.zeros((2, 1)))[:2]))
+        places_px.append(np.stack(film_px(capture.rig, view, direction, np.zeros((2, 1)))[:2]))
     row, col = np.concatenate(places_px, axis=1) + 0.5
-    return FilmPoints(np.resize(view, row.size), row, col).on_film(setup.grid)
+    return FilmPoints(np.resize(view, row.size), row, col).on_film(capture.grid)
 
 
-def _look_for_openings(
-    setup: Setup, sampler: CandidateSampler, z_mm: np.ndarray, contrast: float
-) -> tuple[Samples, int]:
+def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: float) -> tuple[Samples, int]:
     """First hits in openings to surroundings `contrast` times as bright as the mean, and rays traced.
 
     Rays that are followed no further find openings in some view. An opening moves from view to view with what
     is around it, at one of the depths that are known, so it is looked for in every view at such places.
     """
+    capture, grid = sampler.capture, sampler.capture.grid
     rays = int(min(RAYS_PER_CONTRAST * contrast, MAX_OPENING_RAYS))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=3)
-    openings = _trace_misses(sampler, _spread_evenly(setup, rays, path_seed), path_seed)
+    openings = _trace_misses(sampler, even_film_points(capture.grid, rays, path_seed), path_seed)
     depths_mm = z_mm[np.isfinite(z_mm)].astype(np.float64)
     if not openings.k.size or not depths_mm.size:
         return openings, rays
-    grid, rng = setup.grid, seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=4)
+    rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=4)
     cells = np.unique(np.stack([openings.row, openings.col]) // 2, axis=1, return_index=True)[1]
     seen = openings.take(rng.permutation(cells)[:MAX_OPENINGS])
     guesses = int(np.clip(GUESSES // (seen.k.size * grid.view_count), *GUESSES_PER_VIEW))
@@ -315,42 +330,45 @@ def _trace_misses(sampler: CandidateSampler, points: FilmPoints, seed: int) -> S
     return samples._replace(light=samples.guess)
 
 
-def sampler_of_films(setup: Setup, ambient: np.ndarray | None = None) -> CandidateSampler:
+def sampler_of_films(
+    capture: Capture, ambient: np.ndarray | None = None, image_cells: ImageCells | None = None
+) -> CandidateSampler:
     """A sampler that knows of nothing but the films; it guesses light `ambient` (C,) all around, or none."""
-    ambient = np.zeros(setup.channels) if ambient is None else ambient
-    nowhere = layers_for(setup.grid, tile_px_for(setup.grid, MAX_RAYS), np.array([np.inf]))
-    flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
-    return sampler_class(setup)(setup, flat, [np.arange(4)], ambient)
+    ambient = np.zeros(capture.channels) if ambient is None else ambient
+    nowhere = layers_for(capture.grid, tile_px_for(capture.grid, MAX_RAYS), np.array([np.inf]))
+    flat = Majorant(capture.grid, nowhere, np.ones(capture.channels))
+    return sampler_class(capture)(capture, flat, ambient, image_cells)
 
 
 def _warm_up(
-    setup: Setup, explored: Exploration, majorant: Majorant, scopes: Scopes, photons: float, direct: float
-) -> tuple[Exploration, float]:
-    """Warm the majorant up, then rehearse and lift it until little enough light is above the bounds.
+    capture: Capture, plan: Plan, majorant: Majorant, photons: float, direct: float
+) -> tuple[Plan, float]:
+    """Warm the majorant up, then rehearse and raise it until little enough light is above the bounds.
 
     `photons` are wanted; `direct` is light that comes straight from what shines, in the unit of
     `CandidateSampler.mass`. What is known then, and the mass of the films.
     """
-    paths, kept_share, excess_share, is_bounded = explored.paths, KEPT_SHARE_GUESS, 0.0, False
-    rare = list[BrightLight]()
-    allowed, shares = MAX_MISSING_SD / math.sqrt(max(photons, 1.0)), list[float]()
-    groups, make_sampler = scopes.cell_groups, sampler_class(setup)
+    paths, kept_share, excess_share, is_bounded = plan.paths, KEPT_SHARE_GUESS, 0.0, False
+    rare, shares = list[BrightLight](), list[float]()
+    allowed, groups = MAX_MISSING_SD / math.sqrt(max(photons, 1.0)), len(capture.cell_groups)
+
+    def sampler_of_majorant() -> CandidateSampler:
+        return sampler_class(capture)(capture, majorant, plan.ambient, plan.image_cells)
+
     for turn in range(-WARM_UP_ROUNDS, MAX_REHEARSALS):
-        sampler = make_sampler(setup, majorant, groups, explored.ambient)
+        sampler = sampler_of_majorant()
         wanted, most = photons / kept_share, REHEARSAL_PATHS // sampler.paths_each
         if turn < 0:
             wanted, most = WARM_UP_SHARE * photons / KEPT_SHARE_GUESS, WARM_UP_CANDIDATES[1]
         number = int(np.clip(wanted, WARM_UP_CANDIDATES[0], most))
         path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=turn + WARM_UP_ROUNDS)
-        accepted = sampler.try_candidates(np.arange(number) % len(groups), None, path_seed)
+        accepted = sampler.try_candidates(np.arange(number) % groups, None, path_seed)
         paths += sampler.count_paths(number, accepted.ratio.size)
         kept_share = max(accepted.photons.k.size / number, MIN_KEPT_SHARE)
         if turn < 0:
-            factor = _factor(accepted.ratio)
-            kept_share = max(kept_share / factor, MIN_KEPT_SHARE)
-            majorant.scale(factor)
+            kept_share = max(kept_share / majorant.fit_scale(accepted.ratio), MIN_KEPT_SHARE)
         # Rare light shows on few tiles at a time, so tiles farther away are raised too.
-        majorant.lift(accepted.exceeding, reach=int(np.clip(1 + turn // 2, 1, MAX_REACH_TILES)))
+        majorant.list_and_raise(accepted.exceeding, reach=int(np.clip(1 + turn // 2, 1, MAX_REACH_TILES)))
         if turn < 0:
             continue
         of_films = float(sampler.mass.mean()) * kept_share
@@ -362,11 +380,11 @@ def _warm_up(
         is_bounded = (turn == 0 or turn >= MEAN_OF - 1) and excess_share <= allowed
         if is_bounded:
             break
-    mass = make_sampler(setup, majorant, groups, explored.ambient).mass.mean()
-    outcome = {"kept_share": kept_share, "is_bounded": is_bounded, "excess_share": excess_share}
+    plan = replace(plan, thins=is_bounded, paths=paths, kept_share=kept_share, excess_share=excess_share)
     if not is_bounded:  # rehearsals are draws of the same light
-        outcome["unmet"] = tuple(row._replace(light=row.light / len(shares)) for row in rare)
-    return replace(explored, paths=paths, **outcome), float(mass)
+        unmet = tuple(row._replace(light=row.light / len(shares)) for row in rare)
+        plan = replace(plan, bright_light=unmet)
+    return plan, float(sampler_of_majorant().mass.mean())
 
 
 def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.ndarray) -> list[BrightLight]:
@@ -381,14 +399,3 @@ def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.nda
     radiance = exceeding.light[np.arange(colour.size), colour]
     ratio = accepted.ratio[accepted.ratio > 1].astype(np.float64)
     return [BrightLight.of(RARE, ratio * mass_per_candidate, radiance)]
-
-
-def _factor(ratio: np.ndarray) -> float:
-    """By how much to raise all limits for the light above them to be at most `EXCESS_SHARE`."""
-    allowed = EXCESS_SHARE * ratio.sum()
-    ratio = np.sort(ratio)[::-1]
-    # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
-    above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
-    if allowed <= 0:
-        return 1.0
-    return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))

@@ -35,9 +35,10 @@ FAINT = 4.0
 """A coarse tile's bound is raised for what exceeds it by less; for more a tile is listed."""
 GAP_TILES = 3
 """Gaps of this many tiles to every side are closed in a layer."""
-LIFT = 1.25
-"""Where a path exceeds its bound, the bound is raised above it by this factor."""
-
+RAISE_FACTOR = 1.25
+"""Where a path exceeds its bound, the bound is raised to this many times its radiance."""
+EXCESS_SHARE = 1e-5
+"""Share of the light that the warm-up leaves above the majorant."""
 NEXT_LAYERS = (0, -1, 1)
 """Layers in which a path's tile is looked for: that of its first hit, then those beside it."""
 ENDLESS = 1e30
@@ -64,7 +65,7 @@ class Majorant:
         self.entry_of = np.full(layers.tiles, -1, dtype=np.int32)
 
     def copy(self) -> "Majorant":
-        """Another of the same bounds, which is lifted on its own."""
+        """Another of the same bounds, which are raised apart from these."""
         return deepcopy(self)
 
     @property
@@ -97,12 +98,29 @@ class Majorant:
         self.bound[listed] = np.maximum(self.bound[listed] * factor, self.dim)
         self.radiance_ratio_bound[listed] *= factor
 
-    def lift(self, exceeding: Samples, reach: int = 1) -> None:
-        """Raise limits above the radiance of these paths, on their tiles and on those up to `reach` away."""
+    def fit_scale(self, ratio: np.ndarray) -> float:
+        """Scale the limits so that at most `EXCESS_SHARE` of the light lies above them; and by how much.
+
+        `ratio` (N,) is radiance over limit of paths.
+        """
+        allowed, factor = EXCESS_SHARE * ratio.sum(), 1.0
+        ratio = np.sort(ratio)[::-1]
+        # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
+        above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
+        if allowed > 0:
+            factor = float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))
+        self.scale(factor)
+        return factor
+
+    def list_and_raise(self, exceeding: Samples, reach: int = 1) -> None:
+        """Raise limits above the radiance of these paths, on their tiles and on those up to `reach` away.
+
+        Tiles that are not listed yet are added, unless the path is `FAINT`.
+        """
         owner = self.owner_of(exceeding)
         faint = (owner < self.coarse_count) & (exceeding.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
-            _raise(self.bound, owner[faint], LIFT * exceeding.light[faint])
+            _raise_rows(self.bound, owner[faint], RAISE_FACTOR * exceeding.light[faint])
             exceeding = exceeding.take(~faint)
         if not exceeding.k.size:
             return
@@ -111,7 +129,7 @@ class Majorant:
         unlisted = np.unique(near[self.entry_of[near] < 0])
         nothing = np.zeros((unlisted.size, exceeding.light.shape[1]))
         self.list_tiles(unlisted, nothing, nothing)
-        self._raise_to(self.entry_of[around], exceeding)
+        self._raise_entries(self.entry_of[around], exceeding)
 
     def raise_bounds(self, exceeding: Samples, reach: int) -> None:
         """Raise limits above the radiance of these paths, on their own tiles and those up to `reach` away.
@@ -123,18 +141,18 @@ class Majorant:
         if coarse.any():
             row, col = self.row[owner[coarse]], self.col[owner[coarse]]
             rows, cols = squares_around(row, col, reach - 1, self.coarse_rows, self.coarse_cols)
-            self._raise_to(rows * self.coarse_cols + cols, exceeding.take(coarse))
+            self._raise_entries(rows * self.coarse_cols + cols, exceeding.take(coarse))
         if not coarse.all():
             entry = owner[~coarse]
             tiles = layers.flat(self.layer[entry], self.row[entry], self.col[entry])
             near = self.entry_of[layers.around(tiles, reach)]
-            self._raise_to(np.where(near < 0, entry[:, None], near), exceeding.take(~coarse))
+            self._raise_entries(np.where(near < 0, entry[:, None], near), exceeding.take(~coarse))
 
-    def _raise_to(self, entries: np.ndarray, exceeding: Samples) -> None:
+    def _raise_entries(self, entries: np.ndarray, exceeding: Samples) -> None:
         """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
         light, ratio = exceeding.light, exceeding.light / exceeding.guess
         for levels, needed in ((self.bound, light), (self.radiance_ratio_bound, ratio)):
-            _raise(levels, entries.ravel(), LIFT * needed.repeat(entries.shape[1], axis=0))
+            _raise_rows(levels, entries.ravel(), RAISE_FACTOR * needed.repeat(entries.shape[1], axis=0))
 
     def is_above(self, below: "Majorant") -> np.ndarray:
         """Which entries have been raised since `below` was copied, (E,) bool."""
@@ -155,7 +173,7 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
     light = samples.light[followed]
     near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
     table = np.zeros((layers.tiles, dim.size), dtype=np.float32)
-    _raise(table, tiles, samples.guess)
+    _raise_rows(table, tiles, samples.guess)
     hit = np.flatnonzero(table.any(axis=1))
     is_bright = (table[hit] * near.largest(hit)[:, dim.size :] > dim).any(axis=1)
     listed = _without_gaps(layers, layers.around(hit[is_bright]).ravel())
@@ -191,7 +209,7 @@ class _Near:
         for side in (1, 2, 4, COARSE_TILES):
             merged, blocks = layers.merged(side), layers.merge(tiles, side)
             largest = np.zeros((merged.tiles, values.shape[1]), dtype=np.float32)
-            _raise(largest, blocks, values)
+            _raise_rows(largest, blocks, values)
             self.levels.append((side, merged, largest, np.bincount(blocks, minlength=merged.tiles)))
 
     def largest(self, tiles: np.ndarray) -> np.ndarray:
@@ -215,7 +233,7 @@ def _highest(table: np.ndarray, near: np.ndarray) -> np.ndarray:
     return highest
 
 
-def _raise(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+def _raise_rows(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
     """Raise rows (N,), of which some may be the same, of a table (T, C) to at least `values` (N, C)."""
     for column, heights in zip(table.T, values.astype(table.dtype).T, strict=True):
         np.maximum.at(column, rows, heights)

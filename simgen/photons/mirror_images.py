@@ -15,7 +15,8 @@ import numpy as np
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
 from simgen.photons.bright_light import SEED, BrightLight
-from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, Setup, nothing
+from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, nothing
+from simgen.photons.capture import Capture
 from simgen.photons.emission_sampler import EmissionSampler, film_px
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
@@ -51,7 +52,7 @@ class MirrorImages:
     """
 
     def __init__(self, sampler: WavefrontSampler, cells: ImageCells, bound: np.ndarray) -> None:
-        self.sampler, self.grid, self.cells, self.bound = sampler, sampler.setup.grid, cells, bound
+        self.sampler, self.grid, self.cells, self.bound = sampler, sampler.capture.grid, cells, bound
         self.running = np.concatenate([[0.0], np.cumsum(bound)]) / cells.per_px**2
         of_view = self.grid.height * self.grid.width * cells.per_px**2
         first = np.arange(self.grid.view_count + 1, dtype=np.uint64) * np.uint64(of_view)
@@ -67,7 +68,7 @@ class MirrorImages:
         """
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
+        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
         bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
         here = is_of_group[group[candidate], bayer]
         points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
@@ -78,7 +79,7 @@ class MirrorImages:
         i, j = points.row.astype(np.int64), points.col.astype(np.int64)
         origin = {"object_id": object_id, "z_mm": z_mm}
         photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
-        accepted = nothing(self.sampler.setup.channels)
+        accepted = nothing(self.sampler.capture.channels)
         return accepted._replace(photons=photons, candidate=candidate.repeat(number))
 
     def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
@@ -87,7 +88,7 @@ class MirrorImages:
         points, _, cell = self._draw(view, np.random.default_rng(seed))
         radiance, bounces, _, _ = self.sampler.trace_mirrored(points, self.cells.above, seed)
         light = radiance / self.bound[cell] * (self.mass / number)
-        return np.bincount(bounces, light, minlength=self.sampler.setup.max_depth + 1)
+        return np.bincount(bounces, light, minlength=self.sampler.capture.render_scene.max_depth + 1)
 
     def _draw(self, view: np.ndarray, rng: np.random.Generator) -> tuple[FilmPoints, np.ndarray, np.ndarray]:
         """Points of the films of `view` (N,), fewer than these: with the number of each and its cell."""
@@ -112,6 +113,11 @@ class KnownPlaces:
         self.masses = np.array([part.mass for part in self.parts])
         self.mass = float(self.masses.sum())
 
+    @property
+    def image_cells(self) -> ImageCells | None:
+        """Cells in which images of lamps are drawn, which paths through the film leave out."""
+        return next((part.cells for part in self.parts if isinstance(part, MirrorImages)), None)
+
     def try_candidates(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
     ) -> Accepted:
@@ -132,7 +138,7 @@ class KnownPlaces:
 def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> MirrorImages | None:
     """Images of these lights, of which all have arrivals; None if no path meets any of them."""
     peaks = [light.arrivals.peak.min() for light in lights if light.arrivals is not None]
-    grid, above = sampler.setup.grid, LEAST_PEAK * float(min(peaks))
+    grid, above = sampler.capture.grid, LEAST_PEAK * float(min(peaks))
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
 
     def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
@@ -144,7 +150,7 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
 
     for number, light in enumerate(lights):
         rng = seeds.generator(SEED, stage="lamp rays", part=number)
-        first, brought = send(_first_points(sampler.setup, light, rng), 10 + 2 * number)
+        first, brought = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
         if first.view.size:
             around = _evenly_by_pixel(first, MORE_PATHS, rng)
             aside_px = rng.standard_normal((2, MORE_PATHS)) * np.sqrt(light.image_px)
@@ -157,10 +163,10 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
         return None
     finest = CELLS_ACROSS / np.sqrt(min(light.image_px for light in lights))
     per_px = int(np.clip(2 ** np.ceil(np.log2(finest)), 1, MAX_CELLS_PER_PX))
-    cells, bound = _cells_around(sampler.setup, points, brought, per_px)
+    cells, bound = _cells_around(sampler.capture, points, brought, per_px)
     while cells.size > MAX_CELLS:
         per_px //= 2
-        cells, bound = _cells_around(sampler.setup, points, brought, per_px)
+        cells, bound = _cells_around(sampler.capture, points, brought, per_px)
     return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
 
 
@@ -173,7 +179,7 @@ def _evenly_by_pixel(points: FilmPoints, number: int, rng: np.random.Generator) 
     return np.concatenate([half, rng.integers(0, chance.size, number - number // 2)])
 
 
-def _first_points(setup: Setup, light: BrightLight, rng: np.random.Generator) -> FilmPoints:
+def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator) -> FilmPoints:
     """Points of all films around the places at which this light is seen.
 
     Arrivals pass the disc around the cameras beside these. With the place where they pass the image moves on
@@ -181,14 +187,14 @@ def _first_points(setup: Setup, light: BrightLight, rng: np.random.Generator) ->
     """
     from scipy.spatial import KDTree
 
-    arrivals, grid, views = light.arrivals, setup.grid, np.arange(setup.grid.view_count)
+    arrivals, grid, views = light.arrivals, capture.grid, np.arange(capture.grid.view_count)
     assert arrivals is not None
     k, l = np.divmod(views, grid.cols)
-    at_mm, number = setup.rig.position_mm[k, l][:, :2], min(NEIGHBOURS, arrivals.light.size)
+    at_mm, number = capture.rig.position_mm[k, l][:, :2], min(NEIGHBOURS, arrivals.light.size)
     _, nearest = KDTree(arrivals.place_mm).query(at_mm, number)
     nearest = nearest.reshape(-1, number)
     away = np.concatenate([arrivals.slope, np.ones((arrivals.light.size, 1))], axis=1)
-    row, col, _ = film_px(setup.rig, views.repeat(number), away[nearest.ravel()], np.zeros((2, 1)))
+    row, col, _ = film_px(capture.rig, views.repeat(number), away[nearest.ravel()], np.zeros((2, 1)))
     seen_px = np.stack([row, col], axis=1).reshape(-1, number, 2)
     aside_mm = arrivals.place_mm[nearest] - at_mm[:, None]
     design = np.concatenate([np.ones((*aside_mm.shape[:2], 1)), aside_mm], axis=2)
@@ -199,16 +205,16 @@ def _first_points(setup: Setup, light: BrightLight, rng: np.random.Generator) ->
         off_px = np.linalg.norm(seen_px - design @ fitted, axis=2, keepdims=True)
         usual_px = np.maximum(np.median(off_px, axis=1, keepdims=True), MIN_SPREAD_PX)
         weight = 1 / np.sqrt(1 + (off_px / usual_px) ** 2)
-    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(setup.rig, fitted)
+    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(capture.rig, fitted)
     paths = (FIRST_HITS * 2 * np.pi * spread_px**2 / light.image_px).sum()
     moved_px = (seen_px - aside_mm @ fitted[:, 1:]).reshape(-1, 2) + 0.5
-    places = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
-    if not places.view.size:
-        return places
-    which = _evenly_by_pixel(places, int(np.clip(paths, *FIRST_PATHS)), rng)
-    aside_px = rng.standard_normal((2, which.size)) * spread_px[places.view[which]]
-    row, col = places.row[which] + aside_px[0], places.col[which] + aside_px[1]
-    return FilmPoints(places.view[which], row, col).on_film(grid)
+    points = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
+    if not points.view.size:
+        return points
+    which = _evenly_by_pixel(points, int(np.clip(paths, *FIRST_PATHS)), rng)
+    aside_px = rng.standard_normal((2, which.size)) * spread_px[points.view[which]]
+    row, col = points.row[which] + aside_px[0], points.col[which] + aside_px[1]
+    return FilmPoints(points.view[which], row, col).on_film(grid)
 
 
 def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:
@@ -221,11 +227,11 @@ def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:
 
 
 def _cells_around(
-    setup: Setup, points: FilmPoints, radiance: np.ndarray, per_px: int
+    capture: Capture, points: FilmPoints, radiance: np.ndarray, per_px: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (M,) uint64, sorted, of the cells that points (N,) lie in and of those beside them, and the
     largest radiance (M,) of points in each and beside it."""
-    height, width = setup.grid.height * per_px, setup.grid.width * per_px
+    height, width = capture.grid.height * per_px, capture.grid.width * per_px
     row, col = ((part * per_px).astype(np.int64) for part in (points.row, points.col))
     numbers, values = list[np.ndarray](), list[np.ndarray]()
     for down, right in np.ndindex(3, 3):

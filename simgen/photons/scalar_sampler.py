@@ -37,11 +37,12 @@ class ScalarSampler(CandidateSampler):
         object_id, z_mm = object_id[followed], z_mm[followed]
         light = self._follow(candidates, rng)
         self.require_finite(light.sum(axis=1), candidates, object_id)
-        own, place = light[np.arange(len(light)), candidates.colour], (candidates.entry, candidates.colour)
+        radiance = light[np.arange(len(light)), candidates.colour]
+        place = candidates.entry, candidates.colour
         bound = self.majorant.bound[place]
         floor = 0.0 if self.below is None else self.below.bound[place]
-        ratio = own / bound
-        kept = np.flatnonzero(chance[candidate] * bound < np.minimum(own, bound) - floor)
+        ratio = radiance / bound
+        kept = np.flatnonzero(chance[candidate] * bound < np.minimum(radiance, bound) - floor)
         exceeding = np.flatnonzero(ratio > 1)
         photon, origin = _take(candidates, kept), {"object_id": object_id[kept], "z_mm": z_mm[kept]}
         return Accepted(
@@ -54,15 +55,17 @@ class ScalarSampler(CandidateSampler):
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         rng = np.random.default_rng(seed)
         view, i, j = (part[:follow] for part in points)
-        k, l = np.divmod(view, self.setup.grid.cols)
+        k, l = np.divmod(view, self.capture.grid.cols)
         row, col, entry = i.astype(np.int64), j.astype(np.int64), np.zeros_like(k)
         colour = self.colours[row % 2 * 2 + col % 2]
         inside, lens_point = np.ones(view.size, dtype=bool), self._lens_points(rng, view.size)
         candidates = Candidates(k, l, row, col, i - 0.5, j - 0.5, entry, colour, inside, lens_point)
-        if self.setup.render_scene.filters is None:
+        if self.capture.render_scene.filters is None:
             light = self._follow(candidates, rng)
         else:  # once in each colour
-            turns = [candidates._replace(colour=np.full_like(colour, c)) for c in range(self.setup.channels)]
+            turns = [
+                candidates._replace(colour=np.full_like(colour, c)) for c in range(self.capture.channels)
+            ]
             light = np.sum([self._follow(one, rng) for one in turns], axis=0)
         object_id, z_mm = self._first_hits(candidates)
         self.require_finite(light.sum(axis=1), candidates, object_id)
@@ -70,12 +73,12 @@ class ScalarSampler(CandidateSampler):
 
     def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> Candidates:
         """Tile and cell by the bound, the rest evenly."""
-        grid, majorant = self.setup.grid, self.majorant
+        grid, majorant = self.capture.grid, self.majorant
         if view is None:
             view = rng.integers(0, grid.view_count, group.size)
         target = rng.random(group.size)
         entry, cell = np.empty((2, group.size), dtype=np.int64)
-        for number, (cells, running) in enumerate(zip(self.groups, self.running, strict=True)):
+        for number, (cells, running) in enumerate(zip(self.capture.cell_groups, self.running, strict=True)):
             here = group == number
             place = np.searchsorted(running, target[here] * running[-1], side="right")
             entry[here], which = np.divmod(np.minimum(place, running.size - 1), cells.size)
@@ -94,13 +97,13 @@ class ScalarSampler(CandidateSampler):
 
     def _lens_points(self, rng: np.random.Generator, number: int) -> np.ndarray:
         """Points (2, N) of the lens in mm; 0 without one."""
-        if self.setup.rig.lens is None:
+        if self.capture.rig.lens is None:
             return np.zeros((2, number))
-        return self.setup.rig.lens_points(rng.random((2, number)))
+        return self.capture.rig.lens_points(rng.random((2, number)))
 
     def _first_hits(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
-        render_scene, intersect = self.setup.render_scene, self.setup.render_scene.scene.ray_intersect
+        render_scene, intersect = self.capture.render_scene, self.capture.render_scene.scene.ray_intersect
         ids, size = objects_by_shape(render_scene), candidates.k.size
         object_id, z_mm = np.zeros(size, np.int16), np.full(size, np.inf, np.float32)
         for number, ray in enumerate(self._rays(candidates)):
@@ -115,7 +118,7 @@ class ScalarSampler(CandidateSampler):
 
         What the first hit shines itself is left out.
         """
-        render_scene = self.setup.render_scene
+        render_scene = self.capture.render_scene
         sampler = render_scene.mi.load_dict({"type": "independent"})
         integrate, scene = render_scene.scene.integrator().sample, render_scene.scene
         # Mitsuba's sampler takes 32 bits. Each candidate has its own, so that chance makes paths of single
@@ -137,9 +140,9 @@ class ScalarSampler(CandidateSampler):
         if render_scene.filters is None:
             rays, kind = self._rays(candidates), np.dtype((np.float64, 3))
             rgb = np.fromiter(map(radiance, rays, path_seeds), kind, candidates.k.size)
-            return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
+            return rgb if self.capture.cfa is not None else (rgb @ LUMINANCE)[:, None]
         wavelength_nm, weight = render_scene.filters.draw(candidates.colour, rng.random(candidates.k.size))
-        light = np.zeros((candidates.k.size, self.setup.channels))
+        light = np.zeros((candidates.k.size, self.capture.channels))
         for number, (ray, path_seed) in enumerate(zip(self._rays(candidates), path_seeds, strict=True)):
             ray.wavelengths = wavelength_nm[number].tolist()
             light[number, candidates.colour[number]] = weight[number] @ radiance(ray, path_seed)
@@ -147,13 +150,13 @@ class ScalarSampler(CandidateSampler):
 
     def _rays(self, candidates: Candidates) -> Iterator[Any]:
         """The renderer's rays."""
-        mi, frame, one = self.setup.render_scene.mi, self.setup.render_scene.frame, candidates
-        rays = self.setup.rig.rays(one.k, one.l, one.row_px, one.col_px, one.lens_point)
+        mi, frame, one = self.capture.render_scene.mi, self.capture.render_scene.frame, candidates
+        rays = self.capture.rig.rays(one.k, one.l, one.row_px, one.col_px, one.lens_point)
         for row in rows_of(np.concatenate([frame.points(rays[0]), frame.directions(rays[1])], axis=1)):
             yield mi.RayDifferential3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:]))
 
     def _samples(self, candidates: Candidates, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
-        guess = np.full((candidates.k.size, self.setup.channels), GUESS)
+        guess = np.full((candidates.k.size, self.capture.channels), GUESS)
         return Samples(*candidates[:4], z_mm, guess, guess if light is None else light)
 
 

@@ -15,6 +15,7 @@ Nothing is drawn again and nothing discarded, so the result does not depend on w
 photons come of one path. docs/theory.md has the proof.
 """
 
+import math
 from collections import Counter
 from dataclasses import replace
 from itertools import count
@@ -25,13 +26,13 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler, Setup
+from simgen.photons.candidates import Accepted, CandidateSampler
+from simgen.photons.capture import Capture, ranks_in_scopes
 from simgen.photons.disparity_layers import Samples
-from simgen.photons.exploration import MIN_KEPT_SHARE, Exploration, explore, sampler_class
+from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore, sampler_class
 from simgen.photons.majorant import Majorant
-from simgen.photons.scopes import Scopes, places
+from simgen.photons.mirror_images import KnownPlaces
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
-from simgen.spec.recipe import Photons
 
 WAVEFRONT = 1 << 21
 """Largest number of candidates that are traced at once."""
@@ -45,32 +46,21 @@ MAX_SINGLE_PHOTONS = 1 << 25
 
 
 def thin_photons(
-    setup: Setup,
-    photons: Photons,
-    *,
-    seed: int,
-    photons_per_radiance: float | None = None,
-    explored: Exploration | None = None,
-    keeps_origins: bool = True,
-    report: Report = silent,
+    capture: Capture, plan: Plan | None = None, report: Report = silent
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """All photons of all views, ordered by view and pixel, and a log of how they came about.
 
-    One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
-    Without `keeps_origins` a row for each pixel that caught any: of more photons than memory holds.
+    One row for each photon, with scope, rank and first hit; the same for the same capture. Where the plan is
+    not to keep their origins a row for each pixel that caught any: of more photons than memory holds.
 
-    `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
-    `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
-    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it;
-    `InputError` for radiance that is not finite, and for light that exceeds every bound.
+    The `plan` is explored now if it is not yet. Raises `InputError` for radiance that is not finite, and for
+    light that exceeds every bound.
     """
-    scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
-    drawing = _Drawing(setup, scopes, seed, explored or explore(setup, photons, photons_per_radiance), report)
-    if keeps_origins:
-        table = drawing.draw(drawing.totals, photons_per_radiance)
-    else:
-        table = drawing.draw_counts(photons_per_radiance)
-    return table.by_pixel(setup.grid), drawing.log()
+    if plan is None or plan.known_places is None:
+        plan = explore(capture, plan)
+    drawing = _Drawing(capture, plan, report)
+    table = drawing.draw_one_by_one() if plan.keeps_origins else drawing.draw_counts()
+    return table.by_pixel(capture.grid), drawing.log()
 
 
 class _Photons:
@@ -98,33 +88,34 @@ class _Photons:
         scope = np.concatenate(scopes)
         order = np.lexsort((np.concatenate(times), scope))
         scope = scope[order]
-        rank = places(scope)
+        rank = ranks_in_scopes(scope)
         is_wanted = rank < self.wanted[scope]
         photons = joined(tables).take(order[is_wanted])
         return replace(photons, scope=scope[is_wanted], rank=rank[is_wanted])
 
 
 class _Drawing:
-    """One run: the settings, what was explored, and what has been drawn so far.
+    """One run: the capture, its plan, and what has been drawn so far.
 
     `totals` (S,) are the photons that each scope is to have, `number` (S,) those that it has.
     """
 
-    def __init__(
-        self, setup: Setup, scopes: Scopes, seed: int, explored: Exploration, report: Report
-    ) -> None:
-        self.setup = replace(setup, image_cells=explored.image_cells)
-        self.scopes, self.seed, self.report = scopes, seed, report
-        self.explored, self.kept_share = explored, explored.kept_share
-        self.totals = scopes.draw_totals(seed)
+    def __init__(self, capture: Capture, plan: Plan, report: Report) -> None:
+        self.capture, self.plan, self.report = capture, plan, report
+        self.known_places, self.kept_share = plan.known_places or KnownPlaces([]), plan.kept_share
+        self.totals = capture.draw_totals()
         self.number = np.zeros(self.totals.size, dtype=np.int64)
-        self.majorant = None if explored.majorant is None else explored.majorant.copy()
-        self.tally = Counter(paths=explored.paths)
+        self.majorant = None if plan.majorant is None else plan.majorant.copy()
+        self.tally = Counter(paths=plan.paths)
 
-    def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
+    def draw_one_by_one(self) -> PhotonTable:
+        """A row for each photon."""
+        return self._draw(self.totals, self.capture.photons_per_radiance)
+
+    def _draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
         """Every photon one by one: of the exposure `gain`, or without one as many as each scope wants."""
         photons = _Photons(wanted)
-        if self.majorant is not None or self.explored.known_places.mass:
+        if self.majorant is not None or self.known_places.mass:
             if gain is None:
                 self._fill_budgets(photons)
             else:
@@ -135,13 +126,13 @@ class _Drawing:
         self.number += np.bincount(table.scope, minlength=wanted.size)
         return table
 
-    def draw_counts(self, gain: float | None) -> PhotonTable:
+    def draw_counts(self) -> PhotonTable:
         """A row for each pixel that caught photons, drawn in parts that memory holds.
 
         Each part is a draw of its own for a share of the budgets or of the exposure. What one part has
         learned of the light the next ones know; the parts before it are not gone back to.
         """
-        grid, wanted = self.setup.grid, self.totals
+        grid, wanted, gain = self.capture.grid, self.totals, self.capture.photons_per_radiance
         total = np.zeros(int(np.prod(grid.shape_KLHW)), dtype=np.int64)
         expected = float(wanted.sum())
         if gain is not None:
@@ -149,9 +140,9 @@ class _Drawing:
         parts = int(np.ceil(expected / (MAX_SINGLE_PHOTONS / 4)))
         for part in range(parts):
             if gain is not None:
-                photons = self.draw(wanted, gain / parts)
+                photons = self._draw(wanted, gain / parts)
             else:
-                photons = self.draw(wanted * (part + 1) // parts - wanted * part // parts, None)
+                photons = self._draw(wanted * (part + 1) // parts - wanted * part // parts, None)
             np.add.at(total, photons.flat_pixels(grid), 1)
             self.report("parts of the photons", part + 1, parts)
         pixel = np.flatnonzero(total)
@@ -169,10 +160,12 @@ class _Drawing:
             "kept_share": round(kept / max(tally["candidates"], 1), 4),
             "paths_above_bound": tally["exceeding"],
             "bound_raised": tally["raises"],
-            "share_above_bound_before": float(f"{self.explored.excess_share:.3g}"),
+            "share_above_bound_before": float(f"{self.plan.excess_share:.3g}"),
             "paths": tally["paths"],
-            "aimed_at": [light.log for light in self.explored.aimed_at],
+            "aimed_at": [light.log for light in self.plan.bright_light],
             "scopes_without_light": int(((self.number == 0) & (self.totals > 0)).sum()),
+            "dense_paths_instead": self.plan.samples * math.prod(self.capture.grid.shape_KLHW),
+            "normaliser_standard_error": 0.0,
         }
 
     def _fill_budgets(self, photons: _Photons) -> None:
@@ -181,7 +174,7 @@ class _Drawing:
         Scopes are drawn in blocks whose photons are likely to fit a wavefront.
         """
         sampler, wanted = self._film_sampler(), photons.wanted
-        max_dark_candidates = sampler_class(self.setup).max_dark_candidates
+        max_dark_candidates = sampler_class(self.capture).max_dark_candidates
         for block in _split(np.arange(wanted.size), (np.cumsum(wanted) - 1) // (WAVEFRONT // 4)):
             for round_number in count():
                 is_dark = (photons.number == 0) & (photons.tried >= max_dark_candidates)
@@ -190,7 +183,7 @@ class _Drawing:
                     break
                 missing = wanted[some] - photons.number[some]
                 candidates = candidates_needed(missing, round_number, self.kept_share)
-                time = candidates / self._mass(sampler)[self.scopes.group[some]]
+                time = candidates / self._mass(sampler)[self.capture.group_of_scope[some]]
                 self._round(photons, sampler, some, photons.time[some], time, emits=True)
                 photons.time[some] += time
                 self.report("photons", int(np.minimum(photons.number, wanted).sum()), int(wanted.sum()))
@@ -217,7 +210,7 @@ class _Drawing:
             below, before = self.majorant.copy(), max(self.tally["candidates"], WAVEFRONT)
             self.majorant.raise_bounds(exceeding, reach=raises)
             sampler = self._sampler(self.majorant, below)
-            expected = photons.time * sampler.mass[self.scopes.group]
+            expected = photons.time * sampler.mass[self.capture.group_of_scope]
             if raises > MAX_RAISES or expected.sum() > MAX_EXTRA_RATIO * before:
                 raise InputError(
                     "photons: some light paths are so much brighter than all that were met before that "
@@ -230,16 +223,16 @@ class _Drawing:
             self.report("photons above the raised bound", raises, raises)
 
     def _sampler(self, majorant: Majorant, below: Majorant | None = None) -> CandidateSampler:
-        groups, ambient = self.scopes.cell_groups, self.explored.ambient
-        return sampler_class(self.setup)(self.setup, majorant, groups, ambient, below)
+        kind, plan = sampler_class(self.capture), self.plan
+        return kind(self.capture, majorant, plan.ambient, plan.image_cells, below)
 
     def _film_sampler(self) -> CandidateSampler | None:
         return None if self.majorant is None else self._sampler(self.majorant)
 
     def _mass(self, sampler: CandidateSampler | None) -> np.ndarray:
         """Candidates of each group (G,) in one view and unit of time, of films and of what shines."""
-        of_films = np.zeros(len(self.scopes.cell_groups)) if sampler is None else sampler.mass
-        return of_films + self.explored.known_places.mass
+        of_films = np.zeros(len(self.capture.cell_groups)) if sampler is None else sampler.mass
+        return of_films + self.known_places.mass
 
     def _round(
         self,
@@ -252,9 +245,9 @@ class _Drawing:
         emits: bool = False,
     ) -> None:
         """Candidates of some scopes, from time `begin` on: of films, and with `emits` of what shines."""
-        numbers = {"seed": self.seed, "round_number": self.tally["rounds"]}
+        numbers = {"seed": self.capture.seed, "round_number": self.tally["rounds"]}
         rng = seeds.generator(stage="candidate numbers", **numbers)
-        scopes, known, tally = self.scopes, self.explored.known_places, self.tally
+        capture, known, tally = self.capture, self.known_places, self.tally
         candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
         def add(part: Accepted, number: np.ndarray, paths: int) -> None:
@@ -266,20 +259,20 @@ class _Drawing:
             tally.update(candidates=int(number.sum()), followed=part.ratio.size, paths=paths)
 
         if sampler is not None:
-            number = rng.poisson(duration * sampler.mass[scopes.group[some]])
+            number = rng.poisson(duration * sampler.mass[capture.group_of_scope[some]])
             scope = some.repeat(number)
-            view = None if scopes.is_of_all_views else scopes.view[scope]
+            view = None if capture.has_one_budget else capture.view_of_scope[scope]
             path_seed = seeds.integer(stage="candidate paths", **numbers)
-            part = sampler.try_candidates(scopes.group[scope], view, path_seed)
+            part = sampler.try_candidates(capture.group_of_scope[scope], view, path_seed)
             add(part, number, sampler.count_paths(scope.size, part.ratio.size))
         if emits and known.mass:
             number = rng.poisson(duration * known.mass)
             scope = some.repeat(number)
-            view = scopes.view[scope]
-            if scopes.is_of_all_views:
-                view = rng.integers(0, self.setup.grid.view_count, scope.size)
+            view = capture.view_of_scope[scope]
+            if capture.has_one_budget:
+                view = rng.integers(0, self.capture.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            part = known.try_candidates(scopes.group[scope], view, scopes.cell_groups, path_seed)
+            part = known.try_candidates(capture.group_of_scope[scope], view, capture.cell_groups, path_seed)
             add(part, number, scope.size)
         tally["rounds"] += 1
         if emits:

@@ -3,7 +3,6 @@
 What leaves is NumPy.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,11 @@ from simgen.photons.candidates import (
     Candidates,
     CandidateSampler,
     FilmPoints,
-    Setup,
+    ImageCells,
     is_on_film,
     nothing,
 )
+from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
 from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned, whole
@@ -40,15 +40,15 @@ class WavefrontSampler(CandidateSampler):
 
     def __init__(
         self,
-        setup: Setup,
+        capture: Capture,
         majorant: Majorant,
-        groups: Sequence[np.ndarray],
         ambient: np.ndarray,
+        image_cells: ImageCells | None = None,
         below: Majorant | None = None,
     ) -> None:
-        super().__init__(setup, majorant, groups, ambient, below)
-        self.mi = mi = setup.render_scene.mi
-        self.dr, self.light = load_drjit(), light_of(setup.render_scene, setup.cfa)
+        super().__init__(capture, majorant, ambient, image_cells, below)
+        self.mi = mi = capture.render_scene.mi
+        self.dr, self.light = load_drjit(), light_of(capture.render_scene, capture.cfa)
         # Numbers that change from pilot to pilot are passed as data: as constants they would be
         # compiled into the kernel, and each pilot would wait for its own.
         self.opaque_ambient = [opaque(mi.Float, part) for part in ambient]
@@ -57,12 +57,12 @@ class WavefrontSampler(CandidateSampler):
         self.start, self.stop = unsigned(mi, ends - sizes), unsigned(mi, ends - 1)
         self.steps = 6 * -(-int(sizes.max()).bit_length() // 6)
         self.all_running, self.group_mass = doubles(mi, np.concatenate(self.running)), doubles(mi, self.mass)
-        entries = np.arange(majorant.layer.size)
+        entries, groups = np.arange(majorant.layer.size), capture.cell_groups
         self.entry = unsigned(mi, np.concatenate([entries.repeat(cells.size) for cells in groups]))
         self.cell = unsigned(mi, np.concatenate([np.tile(cells, entries.size) for cells in groups]))
         self.colour_of_cell = unsigned(mi, self.colours)
-        places = majorant.layer, majorant.row, majorant.col, majorant.side_px, majorant.entry_of
-        self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in places)
+        tiles = majorant.layer, majorant.row, majorant.col, majorant.side_px, majorant.entry_of
+        self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in tiles)
         self.dim, self.bounds = floats(mi, majorant.dim), self._upload_bounds(majorant)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
         self.bounds_below = self._upload_bounds(below)
@@ -75,13 +75,13 @@ class WavefrontSampler(CandidateSampler):
         self.row_shift, self.col_shift = signed(mi, layers.row_shift), signed(mi, layers.col_shift)
 
     def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
-        setup, mi, dr = self.setup, self.mi, self.dr
+        capture, mi, dr = self.capture, self.mi, self.dr
         if group.size == 0:
-            return nothing(setup.channels)
+            return nothing(capture.channels)
         sampler = streams_for(mi, seed, group.size)
         candidates = self._draw(sampler, unsigned(mi, group), view)
         first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
-        where = candidates.entry * setup.channels + candidates.colour
+        where = candidates.entry * capture.channels + candidates.colour
         bound = dr.gather(mi.Float, self.bounds[0], where)
         guess = self._in_own_colour(first.guess, candidates)
         most, floor = (
@@ -93,7 +93,7 @@ class WavefrontSampler(CandidateSampler):
         dr.eval(promising, most, floor, chance)
         rest = dr.compress(promising)
         if len(rest) == 0:
-            return nothing(setup.channels)
+            return nothing(capture.channels)
         candidates, first = _take(candidates, rest), _take_hits(first, rest)
         light = self._follow(candidates, first, seed, 0)
         most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
@@ -106,11 +106,11 @@ class WavefrontSampler(CandidateSampler):
         candidate = dr.gather(mi.UInt32, rest, kept)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
         self._require_finite(ratio, candidates, first)
-        exceeding = nothing(setup.channels).exceeding
+        exceeding = nothing(capture.channels).exceeding
         if len(over):
             exceeding = self._exceeding(candidates, first, light, over)
         k, l, i, j = (np.array(part) for part in photon[:4])
-        object_id = setup.render_scene.object_of_shape[np.array(hit.shape)]
+        object_id = capture.render_scene.object_of_shape[np.array(hit.shape)]
         origin = {"object_id": object_id, "z_mm": np.array(hit.z_mm)}
         photons = PhotonTable(k, l, i, j, np.ones(len(kept), np.int64), **origin)
         return Accepted(photons, np.array(candidate), np.array(ratio), exceeding)
@@ -119,7 +119,7 @@ class WavefrontSampler(CandidateSampler):
         mi, dr = self.mi, self.dr
         candidates = self._at(streams_for(mi, seed, points.view.size), points)
         some = dr.arange(mi.UInt32, min(follow, points.view.size))
-        guess, light = [0.0] * self.setup.channels, [0.0] * self.setup.channels
+        guess, light = [0.0] * self.capture.channels, [0.0] * self.capture.channels
         z_mm = None
         for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):
             recoloured = candidates._replace(colour=colour)
@@ -141,16 +141,16 @@ class WavefrontSampler(CandidateSampler):
         Its radiance (N,) in each pixel's own colour and the number of mirrors before it; and the object and
         depth of the first hit.
         """
-        mi, setup = self.mi, self.setup
+        mi, capture = self.mi, self.capture
         candidates = self._at(streams_for(mi, seed, points.view.size), points)
         first = self._hit_first(candidates)
         self.dr.make_opaque(*candidates, vars(first))
         sampler = streams_for(mi, seed, points.view.size, part=1)
-        path = self._rays(candidates), first.record, sampler, setup.max_depth, opaque(mi.Float, above)
-        light, bounces = mirrored_radiance(setup.render_scene, *path)
+        path = self._rays(candidates), first.record, sampler, opaque(mi.Float, above)
+        light, bounces = mirrored_radiance(capture.render_scene, *path)
         radiance = self._in_own_colour(light, candidates)
         self.dr.eval(radiance, bounces)
-        object_id = setup.render_scene.object_of_shape[np.array(first.shape)]
+        object_id = capture.render_scene.object_of_shape[np.array(first.shape)]
         return np.array(radiance), np.array(bounces), object_id, np.array(first.z_mm)
 
     def _upload_bounds(self, majorant: Majorant | None) -> tuple[Any, Any]:
@@ -162,7 +162,7 @@ class WavefrontSampler(CandidateSampler):
 
     def _draw(self, sampler: RandomNumbers, group: Any, view_numbers: np.ndarray | None) -> Candidates:
         """One candidate for each of these groups: tile and cell by the bound, the rest evenly."""
-        mi, dr, grid = self.mi, self.dr, self.setup.grid
+        mi, dr, grid = self.mi, self.dr, self.capture.grid
         if view_numbers is None:
             view = dr.minimum(mi.UInt32(sampler.next_1d() * grid.view_count), grid.view_count - 1)
         else:
@@ -201,7 +201,7 @@ class WavefrontSampler(CandidateSampler):
     def _at(self, sampler: RandomNumbers, points: FilmPoints) -> Candidates:
         """Candidates of no entry at these points."""
         mi, dr, number = self.mi, self.dr, points.view.size
-        k, l = np.divmod(points.view, self.setup.grid.cols)
+        k, l = np.divmod(points.view, self.capture.grid.cols)
         row, col = points.row.astype(np.int64), points.col.astype(np.int64)
         colour = gathered(self.colour_of_cell, unsigned(mi, row % 2 * 2 + col % 2))
         wavelength_sample = self.light.wavelength_samples(sampler, number)
@@ -217,7 +217,7 @@ class WavefrontSampler(CandidateSampler):
         )
 
     def _lens_point(self, sampler: RandomNumbers) -> Any:
-        lens = self.setup.rig.lens
+        lens = self.capture.rig.lens
         if lens is None:
             return None
         warp = self.mi.warp.square_to_uniform_disk_concentric
@@ -250,7 +250,7 @@ class WavefrontSampler(CandidateSampler):
 
     def _shifts(self, layer: Any, k: Any, l: Any, active: Any = True) -> tuple[Any, Any]:
         """Rows and columns by which a layer's tiles are moved in each of these views."""
-        mi, grid = self.mi, self.setup.grid
+        mi, grid = self.mi, self.capture.grid
         down = gathered(self.row_shift, layer * grid.rows + mi.Int32(k), active)
         return down, gathered(self.col_shift, layer * grid.cols + mi.Int32(l), active)
 
@@ -260,7 +260,7 @@ class WavefrontSampler(CandidateSampler):
     def _hit_first(self, candidates: Candidates) -> FirstHits:
         self.dr.make_opaque(*candidates)
         ambient = self.light.spread(self.opaque_ambient, candidates.colour, candidates.wavelength_sample)
-        first = hit_first(self.setup.render_scene, self._rays(candidates), candidates.inside, ambient)
+        first = hit_first(self.capture.render_scene, self._rays(candidates), candidates.inside, ambient)
         self.dr.eval(vars(first))
         return first
 
@@ -269,14 +269,14 @@ class WavefrontSampler(CandidateSampler):
         self.dr.make_opaque(*candidates, vars(first))
         # Not the candidates' numbers, which decided which of them are followed.
         sampler = streams_for(self.mi, seed, len(candidates.k), part=1 + turn)
-        rays, longest, left_out = self._rays(candidates), self.setup.max_depth, self._left_out(candidates)
-        light = radiance_along(self.setup.render_scene, rays, first.record, sampler, longest, left_out)
+        rays, left_out = self._rays(candidates), self._left_out(candidates)
+        light = radiance_along(self.capture.render_scene, rays, first.record, sampler, left_out)
         self.dr.eval(light)
         return light
 
     def _left_out(self, candidates: Candidates) -> tuple[Any, Any] | None:
         """Which candidates lie in cells in which images of lamps are drawn apart, and what of them."""
-        cells, mi, dr, grid = self.setup.image_cells, self.mi, self.dr, self.setup.grid
+        cells, mi, dr, grid = self.image_cells, self.mi, self.dr, self.capture.grid
         if cells is None:
             return None
         row, col = (
@@ -295,13 +295,13 @@ class WavefrontSampler(CandidateSampler):
 
     def _rays(self, candidates: Candidates) -> Any:
         at = candidates.k, candidates.l, candidates.row_px, candidates.col_px, candidates.lens_point
-        ray = film_rays(self.setup.render_scene, self.setup.rig, *at)
+        ray = film_rays(self.capture.render_scene, self.capture.rig, *at)
         return self.light.aim(ray, candidates.colour, candidates.wavelength_sample)
 
     def _require_finite(self, radiance: Any, candidates: Candidates, first: FirstHits) -> None:
         values = np.array(radiance)
         if not np.isfinite(values).all():
-            object_id = self.setup.render_scene.object_of_shape[np.array(first.shape)]
+            object_id = self.capture.render_scene.object_of_shape[np.array(first.shape)]
             self.require_finite(values, candidates, object_id)
 
     def _per_colour(self, radiance: Any, candidates: Candidates) -> list[Any]:

@@ -16,8 +16,7 @@ PART = 1 << 14
 
 def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
-    origins_mm = np.broadcast_to(origin_mm, direction.shape)
-    return np.maximum(_objects_hit(render_scene, origins_mm, direction, np.inf), 0)
+    return np.maximum(_objects_hit(render_scene, origin_mm, direction, np.inf), 0)
 
 
 def first_points(
@@ -25,7 +24,7 @@ def first_points(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What rays from one origin (3,) in directions (N, 3) hit first: points (N, 3) in mm, infinite for a
     miss, normals (N, 3) of the surface, and object ids (N,) int16, 0 for none."""
-    rays = _rays(render_scene, np.broadcast_to(origin_mm, direction.shape), direction, np.inf)
+    rays = _rays(render_scene, origin_mm, direction, np.inf)
     scene, frame = render_scene.scene, render_scene.frame
     if is_scalar(render_scene.mi):
         hits = [scene.ray_intersect(render_scene.mi.RayDifferential3f(ray)) for ray in rays]
@@ -77,12 +76,16 @@ def _objects_hit(
 
 
 def _rays(render_scene: RenderScene, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> Any:
-    """Rays along vectors of the world as long as a share of them; in scalar mode one after the other."""
-    mi, frame, length_mm = render_scene.mi, render_scene.frame, np.linalg.norm(away_mm, axis=-1)
-    origin, unit = frame.points(origin_mm), frame.directions(away_mm / length_mm[:, None])
+    """Rays from origins (N, 3), or from one (3,), along a share of vectors (N, 3) of the world.
+
+    In scalar mode they come one after the other.
+    """
+    mi, frame = render_scene.mi, render_scene.frame
+    length_mm = np.sqrt(sum(component**2 for component in away_mm.T))
+    origin, unit = frame.points(np.atleast_2d(origin_mm)), frame.directions(away_mm / length_mm[:, None])
     length = length_mm * share * frame.unit
     if is_scalar(mi):
-        rows = rows_of(np.column_stack([origin, unit, length]))
+        rows = rows_of(np.column_stack([np.broadcast_to(origin, unit.shape), unit, length]))
         return (mi.Ray3f(mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6])), row[6]) for row in rows)
     ray = mi.Ray3f(vectors(mi, mi.Point3f, origin), vectors(mi, mi.Vector3f, unit))
     ray.maxt = floats(mi, length)

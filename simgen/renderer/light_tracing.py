@@ -83,13 +83,12 @@ class _Rays(NamedTuple):
 class LampTracer:
     """Follows light of a scene's lamps to a disc of radius `disc_mm` around the cameras of `rig`.
 
-    The sensor is behind the Bayer pattern `cfa`; a path has at most `max_depth` segments.
+    The sensor is behind the Bayer pattern `cfa`.
     """
 
     render_scene: RenderScene
     rig: Rig
     cfa: str | None
-    max_depth: int
     disc_mm: float
 
     @cached_property
@@ -136,7 +135,7 @@ class LampTracer:
         brightest = (
             self._light_per_power * (rays.power * weight[particle]).sum(axis=1).max(initial=0) / number
         )
-        for _ in range(self.max_depth):
+        for _ in range(self.render_scene.max_depth):
             if not particle.size:
                 break
             distance, object_id, is_perfect, onwards = self._end(rays, rng.random((particle.size, 3)))

@@ -69,8 +69,8 @@ class Reference:
             total += float((radiance[:, :3] @ LUMINANCE * cosine).mean())
         return total
 
-    def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> tuple[Any, Any]:
-        """Mitsuba's scene of all that the file has, its lights `gain` times as bright, and of `own` by
+    def build(self, plugins: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> tuple[Any, Any]:
+        """Mitsuba's scene of all that the file has, its lights `gain` times as bright, and of `plugins` by
         id; and the medium that the cameras stand in, None for air.
 
         Raises `InputError` with what Mitsuba says of a plugin, a parameter or a file.
@@ -80,13 +80,13 @@ class Reference:
         root, ids = state.root.props, iter(self.names)
         for node in filter(_is_object, _children(mi, state, state.root).values()):
             node.props.set_id(next(ids))
-        for name, plugin in own.items():
+        for name, plugin in plugins.items():
             root[name] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
             root[name].set_id(name)
         root["integrator"] = mi.load_dict(integrator)
         scene = _instantiate(mi, config, state, self.path)
         for light in scene.emitters() if gain != 1 else ():
-            if (light.get_shape() or light).id() in own:
+            if (light.get_shape() or light).id() in plugins:
                 continue
             values = mi.traverse(light)
             names = [name for name in values.keys() if BRIGHTNESS.fullmatch(name)]  # noqa: SIM118 (no dict)

@@ -14,11 +14,11 @@ from simgen.assets.triangles import triangles_of
 from simgen.renderer import emission
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import ShiningSurface
-from simgen.renderer.mitsuba_reference import reference_to
+from simgen.renderer.mitsuba_reference import Reference, reference_to
 from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, shape_plugin
 from simgen.renderer.mitsuba_surfaces import paint_patterns, reflectance_plugin, surface_key, surface_plugin
 from simgen.spec.lights import EnvironmentLight
-from simgen.spec.scene import MOST_OBJECTS, Scene
+from simgen.spec.scene import MOST_OBJECTS, Backdrop, Scene
 from simgen.spec.shapes import Mesh, Sphere
 from simgen.spectral.filters import Filters, filters_for
 
@@ -32,11 +32,11 @@ class RenderScene:
 
     `object_of_shape` has object ids by Mitsuba's shape number, int16, 0 for a miss, the backdrop and lamps;
     `names` are those of objects by id, from 1; those of `unscored` count in no score. `filters` are what the
-    camera's pixels see of spectra, None where light is linear sRGB. `shining` is all that shines and can be
-    seen but for what is all around, and `why_rendered` a clause on what the tracer of single photons does not
-    cover. With `has_instances` some objects are instances of a group of shapes. The cameras stand in
-    `medium`, None for air. With `hides_surroundings` they see nothing of what shines from all around where
-    nothing is hit.
+    camera's pixels see of spectra, None where light is linear sRGB. Light paths have at most `max_depth`
+    segments. `shining` is all that shines and can be seen but for what is all around, and `why_rendered` a
+    clause on what the tracer of single photons does not cover. With `has_instances` some objects are
+    instances of a group of shapes. The cameras stand in `medium`, None for air. With `hides_surroundings`
+    they see nothing of what shines from all around where nothing is hit.
     """
 
     mi: Any
@@ -44,6 +44,7 @@ class RenderScene:
     object_of_shape: np.ndarray
     names: Mapping[int, str]
     filters: Filters | None
+    max_depth: int
     shining: tuple[ShiningSurface, ...] = ()
     why_rendered: str = ""
     frame: WorldFrame = field(default_factory=WorldFrame)
@@ -70,21 +71,10 @@ def build(
         load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
     assets = assets or read_assets(scene, folder)
     reference = None if scene.mitsuba is None else reference_to(mi, scene.mitsuba, folder)
-    frame = WorldFrame() if reference is None else reference.frame
-    ids = {f"{OBJECT}{number}": number for number in range(1, len(scene.objects) + 1)}
-    names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
-    unscored = {thing.name for thing in scene.objects if not thing.scored}
-    if scene.mitsuba is not None:
-        unscored.update(scene.mitsuba.unscored)
-    referenced_lux, has_media, has_instances, medium = 0.0, False, False, None
+    ids, names = _numbered_objects(scene, reference, folder)
+    frame, has_media, referenced_lux = WorldFrame(), False, 0.0
     if reference is not None:
-        has_media, has_instances = reference.has_media, reference.has_instances
-        for name in set(names.values()) & set(reference.names):
-            raise InputError(f"{folder}: an object and a shape of the Mitsuba file are both named '{name}'")
-        ids |= {name: number for number, name in enumerate(reference.names, start=1 + len(names))}
-        names |= {ids[name]: name for name in reference.names}
-        if len(names) > MOST_OBJECTS:
-            raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
+        frame, has_media = reference.frame, reference.has_media
         if scene.level is not None:
             referenced_lux = reference.illuminance_lux(scene.level.z_mm)
     around = scene.light_around
@@ -97,16 +87,12 @@ def build(
     gain = emission.level_gain(mi, scene, assets, surroundings, referenced_lux)
     plugins = _object_plugins(mi, scene, assets, gain, frame)
     if scene.backdrop is not None:
-        wall, side_mm = scene.backdrop, 2 * scene.backdrop.half_width_mm
-        matt = {"type": "diffuse", "reflectance": reflectance_plugin(mi, wall.reflectance)}
-        pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
-        to_world, surface = pose @ card_pose(mi, side_mm, side_mm), {"type": "twosided", "bsdf": matt}
-        plugins[BACKDROP] = {"type": "rectangle", "to_world": to_world, "bsdf": surface}
+        plugins[BACKDROP] = _backdrop_plugin(mi, scene.backdrop, frame)
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"{LIGHT}{number}"] = emission.light_plugin(mi, light, gain, surroundings, frame)
     filters = None if curves is None else filters_for(curves, emission.main_spectrum(mi, scene))
     shining, why_rendered = list(emission.shining_surfaces(mi, scene, assets, gain, filters)), ""
-    integrator = {"type": "volpath" if has_media else "path", "max_depth": max_depth}
+    integrator, medium = {"type": "volpath" if has_media else "path", "max_depth": max_depth}, None
     if reference is not None:
         loaded, medium = reference.build(plugins, integrator, gain)
         surfaces, why_rendered = reference.shining_surfaces(loaded, ids, filters)
@@ -120,9 +106,47 @@ def build(
     numbers = shape_numbers(loaded)
     object_of_shape = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
     object_of_shape[numbers] = [ids.get(shape.id(), 0) for shape in loaded.shapes()]
-    seen = mi, loaded, object_of_shape, names, filters, tuple(shining), why_rendered, frame, has_instances
-    unscored_numbers = frozenset(number for number, name in names.items() if name in unscored)
-    return RenderScene(*seen, unscored_numbers, medium, hides_surroundings)
+    unscored = {thing.name for thing in scene.objects if not thing.scored}
+    unscored.update(() if scene.mitsuba is None else scene.mitsuba.unscored)
+    return RenderScene(
+        mi,
+        loaded,
+        object_of_shape,
+        names,
+        filters,
+        max_depth,
+        shining=tuple(shining),
+        why_rendered=why_rendered,
+        frame=frame,
+        has_instances=reference is not None and reference.has_instances,
+        unscored=frozenset(number for number, name in names.items() if name in unscored),
+        medium=medium,
+        hides_surroundings=hides_surroundings,
+    )
+
+
+def _numbered_objects(
+    scene: Scene, reference: Reference | None, folder: Path
+) -> tuple[dict[str, int], dict[int, str]]:
+    """Numbers of the objects by the ids of their shapes, from 1, and names by these numbers."""
+    ids = {f"{OBJECT}{number}": number for number in range(1, len(scene.objects) + 1)}
+    names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
+    if reference is not None:
+        for name in set(names.values()) & set(reference.names):
+            raise InputError(f"{folder}: an object and a shape of the Mitsuba file are both named '{name}'")
+        ids |= {name: number for number, name in enumerate(reference.names, start=1 + len(names))}
+        names |= {ids[name]: name for name in reference.names}
+        if len(names) > MOST_OBJECTS:
+            raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
+    return ids, names
+
+
+def _backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, Any]:
+    """A matt wall, seen from either side."""
+    matt = {"type": "diffuse", "reflectance": reflectance_plugin(mi, wall.reflectance)}
+    pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
+    to_world = pose @ card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
 
 
 def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:

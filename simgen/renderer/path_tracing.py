@@ -158,7 +158,7 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
 
 
 def mirrored_radiance(
-    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int, above: Any
+    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, above: Any
 ) -> tuple[Any, Any]:
     """Radiance that one path from each first hit finds of what is brighter than `above`, in any colour, and
     seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request.
@@ -182,7 +182,8 @@ def mirrored_radiance(
         return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, found, sampler
 
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    left, longest = dr.opaque(mi.UInt32, max_depth - 1), dr.opaque(mi.UInt32, max_depth)
+    longest = dr.opaque(mi.UInt32, render_scene.max_depth)
+    left = dr.opaque(mi.UInt32, render_scene.max_depth - 1)
     path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), mi.UInt32(0), sampler
     path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)
     return path[4], path[6]
@@ -193,17 +194,16 @@ def radiance_along(
     ray: Any,
     record: Any,
     sampler: Any,
-    max_depth: int,
     left_out: tuple[Any, Any] | None = None,
 ) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
     What the first hit shines itself is left out, but not what shines from all around where nothing is hit.
-    A path has at most `max_depth` segments. It is split at the first hit, where `STRATA` x `STRATA` points
+    A path is split at the first hit, where `STRATA` x `STRATA` points
     of each lamp and `BOUNCES` directions are followed, each as one path. Of `left_out`, whether for each ray
     and the radiance above which, `mirrored_radiance` is left out too.
     """
-    mi, dr = render_scene.mi, load_drjit()
+    mi, dr, max_depth = render_scene.mi, load_drjit(), render_scene.max_depth
     hides, above = left_out or (mi.Bool(False), mi.Float(0))
     tracer = _Tracer(render_scene, above)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)

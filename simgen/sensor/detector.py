@@ -173,18 +173,25 @@ def detect(
         dark = np.arange(n.size).repeat(n)
         dark += pixels * rng.integers(each, size=dark.size)
         parts.append(_without_photon(grid, dark, np.ones(dark.size, np.int64)))
-    # One camera takes all views, so its faulty pixels are the same in each.
-    faulty = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
-    hot = faulty[: round(sensor.hot_pixel_share * pixels)]
+    hot, dead = _faulty_pixels(sensor, pixels, seed)
     if hot.size:
         n = rng.poisson(sensor.hot_pixel_counts, (views, hot.size))
         parts.append(_without_photon(grid, (np.arange(views)[:, None] * pixels + hot).ravel(), n.ravel()))
     counts = joined(parts)
-    if sensor.dead_pixel_share > 0:
+    if dead.size:
         works = np.ones(pixels, dtype=bool)
-        works[faulty[pixels - round(sensor.dead_pixel_share * pixels) :]] = False
+        works[dead] = False
         counts = counts.take(works.reshape(grid.shape_HW)[counts.i, counts.j])
     return counts if counts.n.all() else counts.take(counts.n > 0)
+
+
+def _faulty_pixels(sensor: Sensor, pixels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Hot and dead pixels of the one camera that takes all views: the same ones in each."""
+    hot, dead = (round(share * pixels) for share in (sensor.hot_pixel_share, sensor.dead_pixel_share))
+    if not hot + dead:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    order = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
+    return order[:hot], order[pixels - dead :]
 
 
 def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:

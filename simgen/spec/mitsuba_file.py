@@ -6,6 +6,7 @@ looks at the file first: all that it names has to be inside the scene's folder.
 
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Self
 from xml.parsers import expat
@@ -116,15 +117,9 @@ class MitsubaXml:
             self._elements += 1
             if self._elements > MOST_ELEMENTS or depth + len(parents) >= DEEPEST:
                 refuse(f"a scene may have {MOST_ELEMENTS} elements, {DEEPEST} deep")
-            if tag == "path":
-                refuse("<path> is not followed; files are those of the scene's folder")
             values = {key: self._completed(value) for key, value in attributes.items()}
-            for value in values.values():
-                kinds = PurePosixPath(value), PureWindowsPath(value)
-                if any(kind.is_absolute() or ".." in kind.parts for kind in kinds):
-                    refuse(f"{shown_value(value)} leads outside the scene's folder")
-            if not re.fullmatch(r"\w*", values.get("type", ""), re.ASCII):
-                refuse(f"{shown_value(values['type'])} is no name of a plugin")
+            if fault := _fault_of(tag, values):
+                refuse(fault)
             if tag == "default":
                 self._defaults.setdefault(values.get("name", ""), values.get("value", ""))
             parent = parents[-1] if parents else None
@@ -139,16 +134,13 @@ class MitsubaXml:
                 return
             if not file:
                 refuse("a file name is empty")
-            places = folders  # where Mitsuba looks for it
-            if tag == "string":
-                places = folders[-1:]
-            elif tag == "include":
-                places = own_folder, *folders
-            file = self._first(file, places)
+            # Where Mitsuba looks for it.
+            searched = {"string": folders[-1:], "include": (own_folder, *folders)}.get(tag, folders)
+            file = self._first(file, searched)
             asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
-                names.extend(self._read(file, places, depth + len(parents)))
+                names.extend(self._read(file, searched, depth + len(parents)))
 
         parser.StartElementHandler, parser.EndElementHandler = start, lambda _: parents.pop()
         parser.StartDoctypeDeclHandler = lambda *_: refuse("a scene has no DOCTYPE and no entities")
@@ -170,6 +162,19 @@ class MitsubaXml:
         for name in sorted(self._defaults, key=len, reverse=True):
             value = value.replace(f"${name}", self._defaults[name])
         return value
+
+
+def _fault_of(tag: str, values: Mapping[str, str]) -> str:
+    """Why an element with these attributes is refused, or ""."""
+    if tag == "path":
+        return "<path> is not followed; files are those of the scene's folder"
+    for value in values.values():
+        kinds = PurePosixPath(value), PureWindowsPath(value)
+        if any(kind.is_absolute() or ".." in kind.parts for kind in kinds):
+            return f"{shown_value(value)} leads outside the scene's folder"
+    if not re.fullmatch(r"\w*", values.get("type", ""), re.ASCII):
+        return f"{shown_value(values['type'])} is no name of a plugin"
+    return ""
 
 
 def _is_utf8(data: bytes) -> bool:

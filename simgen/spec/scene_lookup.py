@@ -26,10 +26,8 @@ from simgen.spec.scene import Scene, scene_of
 GROUP = "simgen.scenes"
 
 
-def load_scene(
-    name_or_path: str, recipe_folder: Path | None = None, number: int | None = None
-) -> tuple[Scene, Path]:
-    """A scene by name or path, and its folder.
+def load_scene(name_or_path: str, recipe_folder: Path | None = None, number: int | None = None) -> Scene:
+    """A scene by name or path, which knows its folder.
 
     A name is looked up in `recipe_folder`, in the working directory's `scenes/`, among the scenes that ship,
     then among those that Python functions draw; of these `number` says which scene. Raises `InputError` for
@@ -40,7 +38,7 @@ def load_scene(
         return _draw(name_or_path, recipe_folder or Path(), number)
     if number is not None:
         raise InputError(f"scene_number: {file} is one scene, of which there are no draws; leave it out")
-    return scene_of(read_toml(file), file.parent, str(file)), file.parent
+    return scene_of(read_toml(file), file.parent, str(file))
 
 
 def is_drawn(name_or_path: str, recipe_folder: Path | None = None) -> bool:
@@ -89,8 +87,8 @@ def scene_names() -> list[str]:
     return sorted({file.parent.name for file in find_all("scenes/*/scene.toml")})
 
 
-def _draw(name: str, recipe_folder: Path, number: int | None) -> tuple[Scene, Path]:
-    """The scene that a function draws, its number in its title, and the folder of its files."""
+def _draw(name: str, recipe_folder: Path, number: int | None) -> Scene:
+    """The scene that a function draws, with its number in its title."""
     label = f"scene: {name!r}"
     if type(number) is not int or not 0 <= number < SEED_LIMIT:
         raise InputError(f"{label} is drawn by number; give a scene_number from 0 to 2^63 - 1")
@@ -104,7 +102,7 @@ def _draw(name: str, recipe_folder: Path, number: int | None) -> tuple[Scene, Pa
     if not isinstance(scene, Scene):
         raise InputError(f"{label} must return a simgen.Scene, not {type(scene).__name__}")
     folder = scene.folder or Path(inspect.getsourcefile(function) or "").parent
-    return scene.change(title=f"{scene.title} {number}", folder=folder), folder
+    return scene.change(title=f"{scene.title} {number}", folder=folder)
 
 
 def _function(name: str, recipe_folder: Path) -> Callable[[Random], Scene]:

@@ -74,8 +74,8 @@ class Sweep:
 
     def values(self, number: int) -> dict[str, Any]:
         """Value of each swept field of a dataset, the last field varying fastest."""
-        places = np.unravel_index(number, [len(axis.values) for axis in self.axes])
-        return {axis.field: axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True)}
+        indices = np.unravel_index(number, [len(axis.values) for axis in self.axes])
+        return {axis.field: axis.values[int(index)] for axis, index in zip(self.axes, indices, strict=True)}
 
     def folder(self, number: int) -> str:
         """Name of a dataset's folder: its values, the same whatever other values there are."""

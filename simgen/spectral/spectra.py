@@ -85,7 +85,8 @@ def _from_colour_science() -> dict[str, dict[str, Any]]:
         PATCHES: {name.split(" (")[0]: one for name, one in colour.SDS_COLOURCHECKERS[CHART].items()},
     }
     return {
-        kind: {name: measured(table).tolist() for name, table in own.items()} for kind, own in tables.items()
+        kind: {name: measured(table).tolist() for name, table in of_kind.items()}
+        for kind, of_kind in tables.items()
     }
 
 

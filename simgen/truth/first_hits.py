@@ -83,8 +83,8 @@ def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
     passes = np.array(mi.render(render_scene.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
     point, normal, shape = passes[..., -7:-4], passes[..., -4:-1], passes[..., -1].astype(np.int64)
     point, normal = render_scene.frame.points_mm(point), render_scene.frame.world_directions(normal)
-    hit = (normal != 0).any(axis=-1)
-    along = ((point - camera.position_mm) * normal).sum(axis=-1)
+    hit = np.logical_or.reduce([normal[..., axis] != 0 for axis in range(3)])
+    along = sum((point[..., axis] - camera.position_mm[axis]) * normal[..., axis] for axis in range(3))
     facing = normal * np.where(hit, -np.sign(along), 0)[..., None]
     z_mm = np.where(hit, point[..., 2], np.inf)
     if render_scene.has_instances:  # the renderer's output has the shape within the instance
@@ -105,8 +105,8 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
     """
     z = np.pad(hits.z_mm, 1, constant_values=np.inf)
     nearer = hits.z_mm * np.float32(1 - LEAST_STEP)
-    beside = z[1:-1, :-2], z[1:-1, 2:], z[:-2, 1:-1], z[2:, 1:-1]
-    row, col = np.nonzero(np.sum([each < nearer for each in beside], axis=0, dtype=np.uint8) >= 2)
+    neighbours = z[1:-1, :-2], z[1:-1, 2:], z[:-2, 1:-1], z[2:, 1:-1]
+    row, col = np.nonzero(np.sum([each < nearer for each in neighbours], axis=0, dtype=np.uint8) >= 2)
     if not row.size:
         return
     down, right = BESIDE_EDGE_PX * np.array([[-1, -1, 1, 1], [-1, 1, -1, 1]])

@@ -8,7 +8,7 @@ import numpy as np
 
 from pcii.store import write_exr_safely
 from pcii.types import CameraGrid, colour_index, mosaic
-from simgen.photons import Setup, thin_photons
+from simgen.photons import Capture, thin_photons
 from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import PhotonTable, sensitivities
 from simgen.spec import Photons, Recipe, Scene
@@ -63,12 +63,10 @@ def seen(built: RenderScene, grid: CameraGrid, samples: int, seed: int = 1) -> n
 
 
 def thinned(
-    built: RenderScene, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1
+    built: RenderScene, grid: CameraGrid, gain: float, seed: int = 1
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons, `gain` for each unit of radiance, and a log of how they were drawn."""
-    setup = Setup(built, grid, "GRBG", max_depth)
-    photons = Photons(scope="exposure")
-    return thin_photons(setup, photons, seed=seed, photons_per_radiance=gain)
+    return thin_photons(Capture(built, grid, "GRBG", Photons(scope="exposure"), gain, seed))
 
 
 def surprise(

@@ -67,7 +67,7 @@ def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
     built = made([WALL, thing], [], max_depth=3, folder=tmp_path)
     view = seen(built, GRID, 1024)
     gain = 20_000 / view.mean() / GRID.height / GRID.width
-    photons, _ = thinned(built, GRID, 3, gain)
+    photons, _ = thinned(built, GRID, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 4
 
 

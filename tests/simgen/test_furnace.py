@@ -50,7 +50,7 @@ def test_thinned_photons_see_nothing_in_the_furnace() -> None:
     # A ball alone, so that short paths leave nothing out.
     built = made(things(matt(TELLS_NOTHING))[:1], [EVERYWHERE], spectral=True)
     gain = (5_000 if SCALAR else 200_000) / GRID.height / GRID.width / white(built).mean()
-    photons, _ = thinned(built, GRID, 2, gain)
+    photons, _ = thinned(built, GRID, gain)
     colours = colour_index(GRID.height, GRID.width, "GRBG")
     found = np.bincount(colours[photons.i, photons.j], minlength=3)
     expected = gain * white(built) * np.bincount(colours.ravel())

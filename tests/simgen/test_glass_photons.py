@@ -58,7 +58,7 @@ def test_photons_through_glass_are_those_of_rendered_views(light: str, depth: in
     built = made([BEHIND, BALL, PANE], max_depth=depth)
     view = seen(built, GRID, 512)
     gain = (20_000 if SCALAR else 40_000) / view.sum() * 3
-    photons, log = thinned(built, GRID, depth, gain)
+    photons, log = thinned(built, GRID, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 5
     assert log["paths_above_bound"] <= max(1e-3 * photons.k.size, 3)
     # The faults: what is seen through the pane, or upside down in the ball, is that without glass.

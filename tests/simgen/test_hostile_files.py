@@ -20,7 +20,7 @@ def refusal(folder: Path) -> str:
     `build` begins with `read_assets`, before the renderer sees anything.
     """
     with pytest.raises(InputError) as caught:
-        read_assets(*load_scene(str(folder)))
+        read_assets(load_scene(str(folder)), folder)
     sentence = str(caught.value)
     assert sentence.isprintable()
     assert len(sentence) < 800

@@ -12,7 +12,7 @@ from lit_views import made
 from pcii.store import open_dataset
 from simgen.base import random_streams as seeds
 from simgen.dataset import generate
-from simgen.photons import Setup, thin_photons
+from simgen.photons import Capture, thin_photons
 from simgen.spec import Grid, Photons, Recipe
 
 pytestmark = pytest.mark.renders
@@ -89,7 +89,7 @@ def one_by_one(folder: Path) -> np.ndarray:
     built = made(
         [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
     )
-    photons, _ = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
+    photons, _ = thin_photons(Capture(built, grid, "GRBG", Photons(budget=4000), seed=11))
     found = np.zeros((VIEWS, SIDE, SIDE))
     np.add.at(found, (CAMERAS * photons.k + photons.l, photons.i, photons.j), 1)
     return found

@@ -83,7 +83,7 @@ def test_a_spot_is_bright_in_its_beam_and_dark_beyond_its_cutoff() -> None:
     np.testing.assert_allclose(view, expected[..., None].repeat(3, axis=2), rtol=0.02, atol=0.01 * view.max())
     np.testing.assert_allclose(view.mean(axis=(0, 1)), expected.mean(), rtol=2e-3)
     gain = (20_000 if SCALAR else 100_000) / expected.sum()
-    photons, _ = thinned(built, GRID, 2, gain)
+    photons, _ = thinned(built, GRID, gain)
     assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
     # The fault: light is as strong at the rim of the cone as in its middle.
     flat = expected.sum() * (expected > 0)[..., None].repeat(3, axis=2) / (expected > 0).sum()

@@ -123,7 +123,7 @@ def test_vertices_without_faces_do_not_count(tmp_path: Path) -> None:
 def image_of(folder: Path, name: str) -> np.ndarray:
     """A file as the texture of a scene."""
     (folder / "scene.toml").write_text(scene_toml(material=f'texture = "{name}"'))
-    return read_assets(*load_scene(str(folder))).image(name)
+    return read_assets(load_scene(str(folder)), folder).image(name)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3])

@@ -63,7 +63,7 @@ def by_hand(parameters: dict[str, Any], *, clear: bool) -> RenderScene:
             "intensity": {"type": "rgb", "value": 0.5e6},
         },
     }
-    return RenderScene(mi, mi.load_dict(scene), np.zeros(8, np.int16), {}, None)
+    return RenderScene(mi, mi.load_dict(scene), np.zeros(8, np.int16), {}, None, DEPTH)
 
 
 @pytest.mark.parametrize(

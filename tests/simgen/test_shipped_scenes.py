@@ -12,7 +12,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from simgen.check import coarser, load_target
+from simgen.cameras import coarser
+from simgen.check import load_target
 from simgen.renderer import backend, build
 from simgen.spec import Grid, Light, Material, Scene, Shape, Spectrum, Texture, load_recipe, load_scene
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
@@ -40,7 +41,7 @@ MOST_PICTURE_BYTES, MOST_ASSET_BYTES = 60_000, 130_000
 
 @cache
 def scene_of(name: str) -> Scene:
-    return load_scene(str(ROOT / "scenes" / name))[0]
+    return load_scene(str(ROOT / "scenes" / name))
 
 
 @cache
@@ -105,7 +106,7 @@ def test_the_scenes_show_all_that_scenes_can_hold() -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_a_recipe_looks_where_its_objects_are(name: str) -> None:
     recipe, near = load_recipe(str(ROOT / "data_recipes" / f"{name}.toml"))
-    assert load_scene(recipe.scene, near)[0].planes_mm == recipe.analysis.z_mm
+    assert load_scene(recipe.scene, near).planes_mm == recipe.analysis.z_mm
     centre, _, _ = seen(recipe.scene)
     limits = recipe.analysis.z_range_mm
     assert limits is not None

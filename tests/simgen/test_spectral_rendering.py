@@ -100,11 +100,11 @@ def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera
 
 def test_thinned_photons_of_the_chart_are_those_of_spectral_integration() -> None:
     built, made = chart("FL2", CAMERAS[0])
-    grid, gain = made.grid.camera_grid(), capture_of(made, made.seed).photons_per_radiance
+    grid, gain = made.grid.camera_grid(), capture_of(made, built, made.seed).photons_per_radiance
     assert gain is not None
     # A few hundred photons a patch one by one, or some thousand where that is cheap.
     gain *= 0.05 if lit_views.SCALAR else 0.5
-    photons, _ = lit_views.thinned(built, grid, 2, gain, seed=2)
+    photons, _ = lit_views.thinned(built, grid, gain, seed=2)
     counts = np.zeros((grid.height, grid.width))
     np.add.at(counts, (photons.i, photons.j), 1)
     colours = colour_index(grid.height, grid.width, made.cfa)
@@ -127,7 +127,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     built, made = chart("D65", camera)
     grid, exposure = made.grid.camera_grid(), made.exposure
     assert exposure is not None
-    gain = capture_of(made, made.seed).photons_per_radiance
+    gain = capture_of(made, built, made.seed).photons_per_radiance
     assert gain is not None
     view = render_view(built, grid, 0, 0, samples_per_pixel=256, seed=6).astype(np.float64)
     seen = by_patch(view)[21] * gain  # neutral 5

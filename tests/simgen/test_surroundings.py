@@ -99,7 +99,7 @@ def test_an_image_of_ones_is_uniform_light(spectral: bool, tmp_path: Path) -> No
     wanted = 4000 if SCALAR else 30_000
     white = np.ones(3) if around.filters is None else around.filters.white
     gain = wanted / (expected * white).sum() * 3
-    photons, _ = thinned(around, film(), 2, gain)
+    photons, _ = thinned(around, film(), gain)
     assert abs(surprise(photons, expected * white, film(), gain)) < 5
 
 
@@ -114,7 +114,7 @@ def test_photons_in_the_sun_are_those_of_rendered_views(tmp_path: Path) -> None:
     built = made(THINGS, [sky(tmp_path, sunny())], max_depth=DEPTH, folder=tmp_path)
     view = seen(built, film(), 512)
     gain = (5000 if SCALAR else 40_000) / view.sum() * 3
-    photons, log = thinned(built, film(), DEPTH, gain)
+    photons, log = thinned(built, film(), gain)
     assert abs(surprise(photons, view, film(), gain)) < 5
     # The fault: the image is turned by six degrees.
     if not SCALAR:
@@ -138,7 +138,7 @@ def test_what_is_not_visible_lights_things_before_darkness(kind: str, tmp_path: 
     assert not dark[is_whole & ~is_thing].any()
     assert (dark <= lit).all()
     gain = (5000 if SCALAR else 40_000) / dark.sum() * 3
-    photons, _ = thinned(hidden, film(), DEPTH, gain)
+    photons, _ = thinned(hidden, film(), gain)
     assert photons.object_id is not None
     assert (photons.object_id > 0).all()
     expected = seen(hidden, film(), 512)

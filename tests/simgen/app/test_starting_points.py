@@ -44,7 +44,7 @@ def test_a_recipe_is_of_the_scene_of_its_name_or_of_another() -> None:
     write_new_recipe("by-path", "elsewhere/other")
     recipe, near = load_recipe("data_recipes/by-path.toml")
     assert recipe.scene == "../elsewhere/other"
-    assert load_scene(recipe.scene, near)[1].resolve() == Path("elsewhere/other").resolve()
+    assert (load_scene(recipe.scene, near).folder or Path()).resolve() == Path("elsewhere/other").resolve()
     write_new_recipe("drawn", "drawn_solids")
     assert load_recipe("data_recipes/drawn.toml")[0].scene_number == 0
 
@@ -53,9 +53,10 @@ def test_a_copy_has_the_files_and_the_comments_of_the_scene() -> None:
     path = write_new_scene("copy", "two_objects")
     assert path == Path("scenes/copy/scene.toml")
     assert "# A large lamp up to the left" in path.read_text()
-    scene, folder = load_scene("copy")
+    scene = load_scene("copy")
     assert [thing.name for thing in scene.objects] == ["ball", "bird"]
-    assert (folder / "bird.ply").is_file()
+    assert scene.folder is not None
+    assert (scene.folder / "bird.ply").is_file()
 
 
 @pytest.mark.parametrize("name", ["3d", "../a", "", "a b", "scene.toml"])

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lit_scenes import DEPTH, EVENLY, card, lit, two_balls
+from lit_scenes import EVENLY, card, lit, two_balls
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from pcii.types import CameraGrid, mosaic
 from simgen.cameras import Cameras, Rig, as_rig, rig_of
-from simgen.photons import Setup, thin_photons
+from simgen.photons import Capture, thin_photons
 from simgen.renderer import RenderScene, backend, build, film_rays, render_view
 from simgen.sensor import PhotonTable
 from simgen.spec import Lens, Photons, Recipe, Scene
@@ -32,8 +32,7 @@ def dot(point_mm: tuple[float, float, float], side_mm: float = SIDE_MM) -> Rende
 
 
 def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonTable:
-    settings = Photons(budget=budget)
-    return thin_photons(Setup(scene, cameras, None, 2), settings, seed=seed)[0]
+    return thin_photons(Capture(scene, cameras, None, Photons(budget=budget), seed=seed))[0]
 
 
 def off_places(grid: CameraGrid, seed: int = 3) -> Rig:
@@ -181,8 +180,7 @@ def test_a_lens_leaves_an_even_field_as_bright_as_a_pinhole() -> None:
     rig = replace(as_rig(wide), lens=Lens(aperture_mm=4.0, focus_mm=300.0))
     image = render_view(scene, rig, 0, 0, samples_per_pixel=4, seed=1)
     np.testing.assert_allclose(image, 100.0, rtol=1e-5)  # corners, 44 degrees off the axis, too
-    settings = Photons(scope="exposure")
-    drawn, _ = thin_photons(Setup(scene, rig, None, 2), settings, seed=1, photons_per_radiance=0.1)
+    drawn, _ = thin_photons(Capture(scene, rig, None, Photons(scope="exposure"), 0.1, seed=1))
     counts = np.bincount(drawn.i * 40 + drawn.j, minlength=1640)
     assert abs(counts.mean() / 10 - 1) < 4 / np.sqrt(16_400)
     chi_square = ((counts - 10.0) ** 2 / 10.0).sum()
@@ -210,7 +208,7 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
         radiance = mosaic(np.stack(views).astype(np.float64), "GRBG")
         return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
 
-    drawn, _ = thin_photons(Setup(scene, rig, "GRBG", DEPTH), Photons(budget=budget), seed=3)
+    drawn, _ = thin_photons(Capture(scene, rig, "GRBG", Photons(budget=budget), seed=3))
     counts = np.zeros((4, 33, 31))
     np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
 

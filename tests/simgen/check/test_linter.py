@@ -11,8 +11,8 @@ from lit_scenes import ball
 
 from pcii.base import command_line
 from simgen.app import commands as cli
-from simgen.cameras import disparities_px
-from simgen.check import Facts, Finding, ObjectFacts, coarser, findings, probe_scene
+from simgen.cameras import coarser, disparities_px
+from simgen.check import Facts, Finding, ObjectFacts, findings, probe_scene
 from simgen.dataset import Prepared, peak_bytes, product_bytes
 from simgen.photons import Plan
 from simgen.spec import Recipe, Scene

@@ -63,17 +63,17 @@ def test_a_number_gives_the_same_scene_for_all_time(kind: str) -> None:
 
 @pytest.mark.parametrize("name", ["drawn_solids", "drawn_foliage"])
 def test_a_scene_is_the_same_whatever_was_drawn_before(name: str) -> None:
-    scene, _ = load_scene(name, number=3)
+    scene = load_scene(name, number=3)
     random.seed(1)
     random.random()
-    assert load_scene(name, number=3)[0] == scene
-    assert load_scene(name, number=4)[0] != scene
+    assert load_scene(name, number=3) == scene
+    assert load_scene(name, number=4) != scene
     assert is_drawn(name)
 
 
 def test_solids_on_the_desk_stand_and_do_not_touch() -> None:
     for number in range(20):
-        scene, _ = load_scene("drawn_solids", number=number)
+        scene = load_scene("drawn_solids", number=number)
         standing = [thing for thing in scene.objects if thing.name not in ("desk", "wall")]
         assert {"ball", "tin", "block-1"} <= {thing.name for thing in standing}
         for thing in standing:
@@ -103,11 +103,11 @@ def test_scenes_of_another_package_are_found_by_name(tmp_path: Path, monkeypatch
     points = {name: f"strange_scenes:{name}" for name in ("good", "failing", "text")}
     install(tmp_path, monkeypatch, points)
     assert drawn_scenes()["good"] == "the package strange"
-    scene, folder = load_scene("good", number=4)
+    scene = load_scene("good", number=4)
     drawn = random.Random("good 4").randrange(100)
     assert scene.lights[0].luminance_cd_m2 == 1 + drawn  # type: ignore[union-attr]
     assert scene.title == "Strange 4"
-    assert folder == tmp_path  # where the files are that the scene names
+    assert scene.folder == tmp_path  # where the files are that the scene names
     with pytest.raises(InputError, match=r"^scene: 'failing' cannot be drawn: ZeroDivisionError"):
         load_scene("failing", number=4)
     with pytest.raises(InputError, match=r"^scene: 'text' must return a simgen.Scene, not str$"):
@@ -142,4 +142,4 @@ def test_python_named_in_a_recipe_file_runs_only_if_its_author_is_trusted(tmp_pa
     trusted = load_sweep(str(recipe), trust_python=True)
     assert prepare(trusted.recipe(0), trusted.recipe_folder).scene.title == "Strange 2"
     # What the person types is trusted, as any command is.
-    assert load_scene(f"{tmp_path / 'mine.py'}:good", number=2)[0].title == "Strange 2"
+    assert load_scene(f"{tmp_path / 'mine.py'}:good", number=2).title == "Strange 2"

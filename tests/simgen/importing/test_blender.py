@@ -20,13 +20,13 @@ LARGEST_MM = 0.05
 def test_depth_and_objects_are_those_that_blender_sees(tmp_path: Path) -> None:
     said = import_scene(BY_BLENDER / "scene.glb", tmp_path / "scene")
     assert (said.objects, said.lights, said.camera, said.left_out) == (6, 2, "Cam", ())
-    scene, folder = load_scene(str(tmp_path / "scene"))
+    scene = load_scene(str(tmp_path / "scene"))
     casts = np.load(BY_BLENDER / "casts.npz")
     size = len(casts["z_mm"])
     grid = CameraGrid(
         rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=36 / size, height=size, width=size
     )
-    hits = first_hits_at_centre(build(backend.load(), scene, folder, 2), grid)
+    hits = first_hits_at_centre(build(backend.load(), scene, tmp_path / "scene", 2), grid)
     names = np.array(["", *(thing.name for thing in scene.objects)])
     theirs = np.char.replace(casts["name"], ".", "-")
     assert set(theirs.ravel()) == set(names)

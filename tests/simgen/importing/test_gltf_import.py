@@ -31,7 +31,7 @@ def imported(draft: GltfDraft, folder: Path, **options: Any) -> tuple[Scene, tup
         material.setdefault("doubleSided", True)
     (folder / "file.glb").write_bytes(draft.glb())
     said = import_scene(folder / "file.glb", folder / "scene", **options)
-    return load_scene(str(folder / "scene"))[0], said.left_out
+    return load_scene(str(folder / "scene")), said.left_out
 
 
 def corners_mm(scene: Scene, folder: Path, name: str) -> np.ndarray:

@@ -12,12 +12,11 @@ import simgen
 from pcii.base import InputError
 from pcii.types import CameraGrid
 from simgen.cameras import Rig, as_rig
-from simgen.dataset import capture_of
+from simgen.dataset import capture_of, draw_from_views
 from simgen.photons import (
+    Capture,
     EmissionSampler,
     Plan,
-    Setup,
-    draw_from_views,
     explore,
     probe,
     scalar_sampler,
@@ -25,6 +24,7 @@ from simgen.photons import (
     wavefront_sampler,
 )
 from simgen.renderer import RenderScene, ShiningSurface, backend, build
+from simgen.sensor import PhotonTable
 from simgen.spec import Photons, Recipe
 
 COMPILED = backend.choose().kind != "scalar"
@@ -52,6 +52,12 @@ def built(scene: simgen.Scene) -> RenderScene:
     return build(backend.load(), scene, Path(), DEPTH)
 
 
+def drawn(capture: Capture, draws: int) -> list[PhotonTable]:
+    """Photons of as many seeds, whose light is explored once."""
+    explored = explore(capture)
+    return [thin_photons(replace(capture, seed=seed), explored)[0] for seed in range(draws)]
+
+
 LARGE = simgen.Card(width_mm=900.0, height_mm=900.0)
 WALL_RADIANCE = ((0.8 + 0.055) / 1.055) ** 2.4
 PX_PER_MM = 50.0 / 0.5632 / 500.0
@@ -74,10 +80,8 @@ def test_a_lamp_in_view_sends_its_share_of_the_photons(shape: str, size_mm: floa
     if shape != "card":  # which, unlike it, would light the wall
         black = shining(LARGE, WALL_RADIANCE, 620.0, "screen")
         scene = simgen.Scene(title="lamp", objects=(lamp, black))
-    setup = Setup(built(scene), GRID, "GRBG", DEPTH)
     settings = Photons(budget=BUDGET, statistics="multinomial")
-    explored = explore(setup, settings)
-    photons = [thin_photons(setup, settings, seed=seed, explored=explored)[0] for seed in range(4)]
+    photons = drawn(Capture(built(scene), GRID, "GRBG", settings), draws=4)
     of_lamp = [int((one.object_id == 1).sum()) for one in photons]
     total = 4 * BUDGET
     # The front of a box fills its share; its sides, seen by cameras 10 mm aside, 1 / 50 of that more.
@@ -121,11 +125,9 @@ def test_a_hole_in_a_dark_room_shows_the_sky_in_every_view() -> None:
     view = simgen.render(dark, GRID, samples_per_pixel=64, max_depth=DEPTH).view(0, 0)[..., 1]
     sky = 1e4 * float(view.mean())
     lit = dark.change(lights=(lamp, simgen.UniformLight(luminance_cd_m2=sky)))
-    setup, settings = Setup(built(lit), GRID, None, DEPTH), Photons(budget=2000, statistics="multinomial")
-    explored = explore(setup, settings)
-    drawn = [thin_photons(setup, settings, seed=seed, explored=explored)[0] for seed in range(3)]
-    views = np.concatenate([2 * one.k + one.l for one in drawn])
-    beyond_room = np.concatenate([one.z_mm == np.inf for one in drawn])
+    photons = drawn(Capture(built(lit), GRID, None, Photons(budget=2000, statistics="multinomial")), draws=3)
+    views = np.concatenate([2 * one.k + one.l for one in photons])
+    beyond_room = np.concatenate([one.z_mm == np.inf for one in photons])
     beyond = np.bincount(views, beyond_room, minlength=4)
     expected = 6000 * 0.25 * sky / (0.25 * sky + 64 * 64 * sky / 1e4)
     assert (np.abs(beyond - expected) < 5 * np.sqrt(6000 / 4)).all()
@@ -135,7 +137,7 @@ def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[
     """Light of a surface on all films by the sampler, and the largest share of a bound that is used."""
     light = simgen.UniformLight(luminance_cd_m2=1.0)
     scene = built(simgen.Scene(title="empty", lights=(light,)))
-    sampler = EmissionSampler(Setup(replace(scene, shining=(surface,)), rig, cfa, DEPTH))
+    sampler = EmissionSampler(Capture(replace(scene, shining=(surface,)), rig, cfa))
     if not sampler.mass:
         return 0.0, 0.0
     view = np.arange(4096) % rig.grid.view_count
@@ -191,7 +193,8 @@ def test_a_lamp_that_the_probe_misses_is_in_the_forecast() -> None:
     lamp_px = 0.0003
     luminance = 64 * 64 * WALL_RADIANCE / lamp_px
     size_mm = np.sqrt(lamp_px) / PX_PER_MM
-    looked = probe(Setup(built(wall(shining(SHAPES["card"](size_mm), luminance))), GRID, "GRBG", 3), seed=1)
+    scene = built(wall(shining(SHAPES["card"](size_mm), luminance)))
+    looked = probe(Capture(scene, GRID, "GRBG"), seed=1)
     assert looked.mean == pytest.approx(2 * WALL_RADIANCE, rel=0.2)
     assert looked.variance == pytest.approx(lamp_px / 64**2 * luminance**2, rel=0.3)
 
@@ -200,7 +203,8 @@ def test_noise_of_views_is_measured_and_too_much_is_refused() -> None:
     """Of half-views that differ by sqrt(2) of a rate, whose mean has a variance of half of that squared."""
     grid = {"rows": 2, "cols": 2, "height": 64, "width": 64}
     made = Recipe.model_validate({"scene": "any", "grid": grid, "photons": {"budget": 500}})
-    capture, plan = capture_of(made, 1), Plan(False, 4, 500.0)
+    no_scene: Any = None
+    capture, plan = capture_of(made, no_scene, 1), Plan(False, 4, 500.0)
     shape = made.grid.height, made.grid.width
 
     def draw(variance: float) -> dict[str, Any]:
@@ -217,7 +221,7 @@ def test_noise_of_views_is_measured_and_too_much_is_refused() -> None:
 
 @pytest.mark.renders
 def test_radiance_that_is_no_number_is_refused_with_the_object(monkeypatch: pytest.MonkeyPatch) -> None:
-    setup = Setup(built(wall()), GRID, "GRBG", DEPTH)
+    capture = Capture(built(wall()), GRID, "GRBG", Photons(budget=100))
     module = wavefront_sampler.WavefrontSampler if COMPILED else scalar_sampler.ScalarSampler
     follow = module._follow
 
@@ -227,4 +231,4 @@ def test_radiance_that_is_no_number_is_refused_with_the_object(monkeypatch: pyte
 
     monkeypatch.setattr(module, "_follow", broken)
     with pytest.raises(InputError, match=r"^object 'wall': its radiance in row \d+, column \d+ of view \(\d"):
-        explore(setup, Photons(budget=100))
+        explore(capture)

@@ -12,10 +12,8 @@ from scipy import stats
 from pcii.base import InputError, silent
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.types import PhotonCounts, colour_index
-from simgen.dataset import capture_of
-from simgen.photons import Plan, Setup, draw_from_views, write_counts
-from simgen.photons import plan as make_plan
-from simgen.photons import thin as thin_photons
+from simgen.dataset import capture_of, draw_from_views, write_counts
+from simgen.photons import Capture, Plan, plan_counts, thin_photons
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import PhotonTable, nested_subset
 from simgen.spec import Recipe, Scene, load_scene
@@ -43,17 +41,19 @@ def mosaic_of(k: int, l: int) -> np.ndarray:
     return (1 + 2 * k + l) * ((7 * np.arange(HEIGHT * WIDTH)) % 23.0).reshape(HEIGHT, WIDTH)
 
 
-def setup_of(made: Recipe, render_scene: RenderScene) -> Setup:
-    return Setup(render_scene, capture_of(made, made.seed).rig, made.cfa, made.render.max_depth)
-
-
 def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
-    setup = setup_of(made, render_scene)
-    return make_plan(capture_of(made, made.seed), setup, kind, may_explore=lambda _: False)
+    capture = capture_of(made, render_scene, made.seed)
+    return plan_counts(capture, kind, may_explore=lambda _: False)
 
 
 def thin(made: Recipe, render_scene: RenderScene, plan: Plan = PLAN) -> PhotonTable:
-    return thin_photons(capture_of(made, made.seed), setup_of(made, render_scene), plan)[0]
+    return thin_photons(capture_of(made, render_scene, made.seed), plan)[0]
+
+
+def without_scene(made: Recipe) -> Capture:
+    """For counts that are drawn from made-up views."""
+    no_scene: Any = None
+    return capture_of(made, no_scene, made.seed)
 
 
 def no_noise(k: int, l: int) -> np.ndarray:
@@ -61,13 +61,13 @@ def no_noise(k: int, l: int) -> np.ndarray:
 
 
 def dense(made: Recipe) -> PhotonTable:
-    return draw_from_views(capture_of(made, made.seed), mosaic_of, no_noise, PLAN, silent)[0]
+    return draw_from_views(without_scene(made), mosaic_of, no_noise, PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
 def two_objects() -> RenderScene:
-    found, folder = load_scene("two_objects")
-    return build(backend.load(), found, folder, 3)
+    found = load_scene("two_objects")
+    return build(backend.load(), found, found.folder or Path(), 3)
 
 
 def counted(counts: PhotonTable, made: Recipe) -> np.ndarray:
@@ -176,7 +176,7 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
     arrivals, log = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
+        without_scene(made), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
@@ -207,7 +207,7 @@ IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
 @pytest.mark.parametrize("sensor", [{}, FAULTY | {"bits": 2}, IN_FRAMES])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
-    told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
+    told = write_counts(without_scene(made), made.sensor, dense(made), tmp_path, with_origins=True)
     whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
     assert (small <= middle).all()
     assert (middle <= whole).all()
@@ -223,7 +223,7 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
 
 def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     lost = recipe(sensor={"quantum_efficiency": (1e-9,) * 3, "dark_counts": 0.5})
-    write_counts(capture_of(lost, lost.seed), lost.sensor, dense(lost), tmp_path, with_origins=True)
+    write_counts(without_scene(lost), lost.sensor, dense(lost), tmp_path, with_origins=True)
     whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
     np.testing.assert_array_equal(whole, small)
     assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
@@ -245,9 +245,7 @@ def from_known_places(made: Recipe) -> PhotonTable:
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))
-    write_counts(
-        capture_of(made, made.seed), made.sensor, from_known_places(made), tmp_path, with_origins=True
-    )
+    write_counts(without_scene(made), made.sensor, from_known_places(made), tmp_path, with_origins=True)
     origins = zarr.open_group(tmp_path / nested_name(PHOTON_TRUTH, budget), mode="r")
     object_id, z_mm = np.asarray(origins["object_id"]), np.asarray(origins["z_mm"])
     counts = stored(tmp_path, made, budget).ravel()
@@ -263,7 +261,7 @@ def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: di
 
 def test_frames_are_written_on_request_and_nested_like_the_photons(tmp_path: Path) -> None:
     made = recipe(sensor=IN_FRAMES | {"frames": 40}, photons=nested(scope="scene"))
-    capture, arrivals = capture_of(made, made.seed), from_known_places(made)
+    capture, arrivals = without_scene(made), from_known_places(made)
     write_counts(capture, made.sensor, arrivals, tmp_path, with_origins=True, keeps_frames=True)
     bits: dict[float | None, set[tuple[int, ...]]] = {}
     for budget in (None, 40, 8):

@@ -7,7 +7,7 @@ import pytest
 from lit_scenes import two_balls
 
 from pcii.types import CameraGrid, sense
-from simgen.photons import Setup, probe
+from simgen.photons import Capture, probe
 from simgen.renderer import RenderScene, render_view
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=1.0, height=64, width=64)
@@ -33,16 +33,16 @@ def radiance(scene: RenderScene) -> np.ndarray:
 
 @pytest.mark.renders
 def test_the_probe_sees_the_mean_and_repeats_itself(scene: RenderScene, radiance: np.ndarray) -> None:
-    looked = probe(Setup(scene, GRID, "GRBG", 3), seed=1)
+    looked = probe(Capture(scene, GRID, "GRBG"), seed=1)
     spread = np.sqrt(looked.variance / (2 * PROBE_SAMPLES * radiance.size))
     assert abs(looked.mean - radiance.mean()) < 4 * spread
-    assert probe(Setup(scene, GRID, "GRBG", 3), seed=1) == looked
-    assert probe(Setup(scene, GRID, "GRBG", 3), seed=2) != looked
+    assert probe(Capture(scene, GRID, "GRBG"), seed=1) == looked
+    assert probe(Capture(scene, GRID, "GRBG"), seed=2) != looked
 
 
 def looked_often(built: RenderScene, grid: CameraGrid) -> Any:
     """The mean of four probes: few paths find much light, and one probe's variance is good to 16 %."""
-    found = [probe(Setup(built, grid, "GRBG", 3), seed) for seed in range(4)]
+    found = [probe(Capture(built, grid, "GRBG"), seed) for seed in range(4)]
     mean, variance = (float(np.mean(values)) for values in zip(*(one[:2] for one in found), strict=True))
     return found[0]._replace(mean=mean, variance=variance)
 
@@ -74,7 +74,7 @@ def test_counts_are_as_noisy_as_the_probe_tells(scene: RenderScene, radiance: np
 def test_planned_samples_keep_rendering_noise_out_of_the_counts(
     scene: RenderScene, radiance: np.ndarray
 ) -> None:
-    looked = probe(Setup(scene, GRID, "GRBG", 3), seed=1)
+    looked = probe(Capture(scene, GRID, "GRBG"), seed=1)
     gain = 0.295 * looked.mean / looked.variance
     samples = looked.samples_for(gain)
     assert samples == 30

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_scenes import DEPTH, EVENLY, LAMP, ball, lit, two_balls
+from lit_scenes import EVENLY, LAMP, ball, lit, two_balls
 from scipy import stats
 
 from pcii.base import InputError
 from pcii.types import CameraGrid, colour_index, mosaic
-from simgen.cameras import as_rig
-from simgen.photons import Capture, Exploration, Setup, explore, plan, thin_photons
+from simgen.photons import Capture, Plan, explore, plan_counts, thin_photons
 from simgen.renderer import RenderScene, backend, load_drjit, render_view
 from simgen.sensor import PhotonTable
 from simgen.spec import Photons
@@ -41,11 +40,7 @@ def radiance(scene: RenderScene) -> np.ndarray:
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
 
 
-def setup_of(scene: RenderScene) -> Setup:
-    return Setup(scene, GRID, "GRBG", DEPTH)
-
-
-explorations: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+explorations: dict[tuple[int, str], tuple[RenderScene, Plan]] = {}
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -55,17 +50,17 @@ def scenes_are_given_up() -> Iterator[None]:
     explorations.clear()
 
 
-def explored(scene: RenderScene, settings: Photons) -> Exploration:
+def explored(capture: Capture) -> Plan:
     """It is the same for all seeds, and takes longer than a draw of few photons."""
-    key = id(scene), settings.model_dump_json()
+    key = id(capture.render_scene), capture.photons.model_dump_json()
     if key not in explorations:
-        explorations[key] = scene, explore(setup_of(scene), settings)
+        explorations[key] = capture.render_scene, explore(capture)
     return explorations[key][1]
 
 
 def draw_with_log(scene: RenderScene, seed: int, **photons: object) -> tuple[PhotonTable, dict[str, Any]]:
-    settings = Photons.model_validate(photons)
-    return thin_photons(setup_of(scene), settings, seed=seed, explored=explored(scene, settings))
+    capture = Capture(scene, GRID, "GRBG", Photons.model_validate(photons), seed=seed)
+    return thin_photons(capture, explored(capture))
 
 
 def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonTable:
@@ -283,7 +278,7 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
         assert stats.chi2.sf(((found - missing) ** 2 / missing).sum(), own.size) < 1e-3
 
 
-def too_low(explored: Exploration, factor: float) -> Exploration:
+def too_low(explored: Plan, factor: float) -> Plan:
     """The same with bounds that most paths exceed."""
     assert explored.majorant is not None
     majorant = explored.majorant.copy()
@@ -295,19 +290,12 @@ def too_low(explored: Exploration, factor: float) -> Exploration:
 def test_what_exceeds_the_bounds_is_drawn_after_all(
     scene: RenderScene, radiance: np.ndarray, light: dict, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings, setup = Photons.model_validate(light), setup_of(scene)
     gain = None if "budget" in light else MANY / 5 / radiance.sum()
-    known, reported = too_low(explore(setup, settings, gain), 0.2), list[tuple[str, int, int]]()
+    capture = Capture(scene, GRID, "GRBG", Photons.model_validate(light), gain, seed=5)
+    known, reported = too_low(explore(capture), 0.2), list[tuple[str, int, int]]()
 
     def chi_square() -> float:
-        drawn, log = thin_photons(
-            setup,
-            settings,
-            seed=5,
-            photons_per_radiance=gain,
-            explored=known,
-            report=lambda *stage: reported.append(stage),
-        )
+        drawn, log = thin_photons(capture, known, lambda *stage: reported.append(stage))
         assert log["paths_above_bound"] > 100
         expected = on_tiles(rates_of(radiance, MANY / 20) if gain is None else gain * radiance)
         found = on_tiles(counted(drawn))
@@ -326,7 +314,7 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         assert done == sorted(done)
     # The fault: paths that exceed their bound give one photon, and nothing is drawn of what lies above.
     monkeypatch.setattr("simgen.photons.thinning._Drawing._draw_above", lambda *_: None)
-    thin = thin_photons(setup, settings, seed=5, photons_per_radiance=gain, explored=known)[0]
+    thin = thin_photons(capture, known)[0]
     expected = on_tiles(rates_of(radiance, float(thin.k.size) / 4))
     assert stats.chi2.sf(((on_tiles(counted(thin)) - expected) ** 2 / expected).sum(), expected.size) < 1e-6
 
@@ -335,11 +323,11 @@ def test_light_that_exceeds_every_bound_is_refused(
     scene: RenderScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("simgen.photons.thinning.MAX_RAISES", 1)
-    monkeypatch.setattr("simgen.photons.majorant.LIFT", 0.3)  # never above what exceeded
-    settings, setup = Photons(budget=2000), setup_of(scene)
-    known = too_low(explore(setup, settings), 0.05)
+    monkeypatch.setattr("simgen.photons.majorant.RAISE_FACTOR", 0.3)  # never above what exceeded
+    capture = Capture(scene, GRID, "GRBG", Photons(budget=2000), seed=1)
+    known = too_low(explore(capture), 0.05)
     with pytest.raises(InputError, match=r"^photons: some light paths are so much brighter"):
-        thin_photons(setup, settings, seed=1, explored=known)
+        thin_photons(capture, known)
 
 
 WALL = {
@@ -362,8 +350,7 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
     grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
     for material, is_bounded in ((metal, False), ({"reflectance": (0.7, 0.3, 0.2)}, True)):
         thing = ball("ball", 40.0, 590.0, (1, 1, 1)) | {"material": material}
-        setup = Setup(lit([WALL, thing], [lamp]), grid, "GRBG", 3)
-        capture = Capture(as_rig(grid), "GRBG", Photons(budget=3000), None, seed=1)
-        made = plan(capture, setup, backend.choose().kind)
+        capture = Capture(lit([WALL, thing], [lamp]), grid, "GRBG", Photons(budget=3000), seed=1)
+        made = plan_counts(capture, backend.choose().kind)
         assert (made.thins, bool(made.why_rendered)) == (is_bounded, not is_bounded)
         assert made.noise <= 0.01

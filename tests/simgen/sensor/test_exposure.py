@@ -9,8 +9,8 @@ import pytest
 
 from pcii.base import silent
 from pcii.types import colour_index, sense
-from simgen.dataset import capture_of
-from simgen.photons import Plan, Setup, draw_from_views, plan, thin
+from simgen.dataset import capture_of, draw_from_views
+from simgen.photons import Plan, plan_counts, thin_photons
 from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import PhotonTable, photons_per_radiance
 from simgen.spec import Exposure, Recipe, Scene
@@ -44,9 +44,7 @@ def planned(thins: bool) -> Plan:
 
 
 def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
-    capture = capture_of(made, made.seed)
-    setup = Setup(built, capture.rig, capture.cfa, made.render.max_depth)
-    return thin(capture, setup, planned(True))[0]
+    return thin_photons(capture_of(made, built, made.seed), planned(True))[0]
 
 
 def dense(made: Recipe, built: RenderScene) -> PhotonTable:
@@ -56,9 +54,8 @@ def dense(made: Recipe, built: RenderScene) -> PhotonTable:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
         return sense(image, made.cfa)
 
-    return draw_from_views(
-        capture_of(made, made.seed), mosaic_of, lambda k, l: np.zeros(3), planned(False), silent
-    )[0]
+    capture = capture_of(made, built, made.seed)
+    return draw_from_views(capture, mosaic_of, lambda k, l: np.zeros(3), planned(False), silent)[0]
 
 
 def counted(arrivals: PhotonTable) -> np.ndarray:
@@ -94,8 +91,7 @@ def test_an_even_light_gives_the_photons_by_hand(lit_evenly: RenderScene, draw: 
 
 @pytest.mark.renders
 def test_the_plan_expects_the_photons_by_hand(lit_evenly: RenderScene) -> None:
-    capture = capture_of(recipe(), 1)
-    made = plan(capture, Setup(lit_evenly, capture.rig, "GRBG", 3), "llvm", may_explore=lambda _: False)
+    made = plan_counts(capture_of(recipe(), lit_evenly, 1), "llvm", may_explore=lambda _: False)
     assert made.photons_per_view == pytest.approx(64 * 80 * BY_HAND, rel=1e-3)
     assert made.noise == pytest.approx(0, abs=1e-6)  # single precision: an even light has no noise
     assert made.samples == 1

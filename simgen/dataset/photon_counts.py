@@ -1,6 +1,5 @@
-"""The photon counts of a dataset: thinned or drawn from views, counted by the sensor, written."""
+"""The photon counts of a dataset: drawn from rendered views, counted by the sensor, written."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,36 +8,18 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base.progress import Report
 from pcii.store.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.store.dataset_writer import write_counts as save_counts
 from pcii.store.dataset_writer import write_photon_truth
 from pcii.types.photon_limit import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan
-from simgen.photons.scopes import places
-from simgen.photons.thinning import thin_photons
+from simgen.photons.capture import Capture, ranks_in_scopes
+from simgen.photons.exploration import Plan
+from simgen.photons.light_probe import MAX_NOISE_SHARE
 from simgen.sensor import detector
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
-
-
-def thin(
-    capture: Capture, setup: Setup, plan: Plan, report: Report = silent
-) -> tuple[PhotonTable, dict[str, Any]]:
-    """Photons of all views drawn one by one, and what the manifest says of them; see `thin_photons`."""
-    photons, log = thin_photons(
-        setup,
-        capture.photons,
-        seed=capture.seed,
-        photons_per_radiance=capture.photons_per_radiance,
-        explored=plan.explored,
-        keeps_origins=plan.keeps_origins,
-        report=report,
-    )
-    dense_paths = plan.samples * math.prod(capture.grid.shape_KLHW)
-    return photons, log | {"dense_paths_instead": dense_paths, "normaliser_standard_error": 0.0}
 
 
 def draw_from_views(
@@ -54,11 +35,11 @@ def draw_from_views(
     noise that adds more than `MAX_NOISE_SHARE` to the variance of the counts, and for too much light in a
     pixel.
     """
-    scopes, cfa, photons, gain = capture.scopes, capture.cfa, capture.photons, capture.photons_per_radiance
+    cfa, photons, gain = capture.cfa, capture.photons, capture.photons_per_radiance
     views = list(np.ndindex(capture.grid.rows, capture.grid.cols))
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
     normalisers, gains = energies, np.full_like(energies, 0.0 if gain is None else gain)
-    if scopes.is_of_all_views:
+    if capture.has_one_budget:
         normalisers = np.broadcast_to(energies.sum(axis=0), energies.shape)
     if gain is None:
         np.divide(photons.budget, normalisers, out=gains, where=normalisers > 0)
@@ -75,17 +56,7 @@ def draw_from_views(
     totals = detector.fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns = []
     for number, (k, l) in enumerate(views):
-        raw = mosaic_of(k, l)
-        if gain is not None:
-            rates = raw * gain
-            if not np.nanmax(rates) <= MOST_PHOTONS:
-                raise InputError(
-                    f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
-                )
-        else:
-            assert photons.scope != "exposure"  # which has a gain
-            light = Light(photons.budget, photons.scope)
-            rates = photon_rates(raw, cfa, light, normalisers[number])
+        rates = _photon_rates(capture, mosaic_of(k, l), normalisers[number], (k, l))
         rng = seeds.generator(capture.seed, view=number, stage="photons")
         counts = detector.draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)
@@ -104,6 +75,20 @@ def draw_from_views(
         "normaliser_standard_error": plan.normaliser_error,
         "bright_light_forecast": [light.log for light in plan.bright_light],
     }
+
+
+def _photon_rates(
+    capture: Capture, mosaic: np.ndarray, normaliser: np.ndarray, view: tuple[int, int]
+) -> np.ndarray:
+    """Mean photons (H, W) of each pixel of a view, of which the scopes' light (C,) is the `normaliser`."""
+    gain, photons = capture.photons_per_radiance, capture.photons
+    if gain is None:
+        assert photons.scope != "exposure"  # which has a gain
+        return photon_rates(mosaic, capture.cfa, Light(photons.budget, photons.scope), normaliser)
+    rates = mosaic * gain
+    if not np.nanmax(rates) <= MOST_PHOTONS:
+        raise InputError(f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view {view}")
+    return rates
 
 
 def write_counts(
@@ -146,8 +131,8 @@ def write_counts(
 def _rank(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
     """A row for each photon, with its scope and a random rank there, so that budgets can be nested."""
     rows = arrivals.one_by_one()
-    scope = capture.scopes.scope_of(rows)
+    scope = capture.scope_of(rows)
     order = np.lexsort((seeds.generator(capture.seed, stage="nested ranks").random(scope.size), scope))
     rank = np.empty(scope.size, dtype=np.int64)
-    rank[order] = places(scope[order])
+    rank[order] = ranks_in_scopes(scope[order])
     return replace(rows, scope=scope, rank=rank)
