@@ -46,7 +46,8 @@ def inputs_of(
     # At 1000 px of disparity the range is so short that it is not too many px to be searched.
     z_range_mm = (0.99, 1.0) if z_mm == 1 else (z_mm, 900.0)
     n, image, rng = photons.ravel(), film(*grid.shape_HW), np.random.default_rng(1)
-    names = vars(pcii) | locals() | {"simgen": simgen, "folder": folder / "data", "pictures": folder}
+    names = {name: getattr(pcii, name) for name in pcii.__all__} | locals()
+    names |= {"simgen": simgen, "folder": folder / "data", "pictures": folder}
     words = re.findall(r"\w+", call)
     if "views" in words:
         names["views"] = pcii.Views(light, grid)
