@@ -4,7 +4,7 @@ from pathlib import Path
 
 from simgen.app.pictures import draw_preview
 from simgen.check.targets import load_target
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 from simgen.spec.scene_lookup import load_scene
 
 DOCS = Path(__file__).resolve().parent

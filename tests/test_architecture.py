@@ -69,6 +69,7 @@ KNOW_RECIPE = {
     "simgen.dataset.generation",
     "simgen.dataset.prepared",
     "simgen.dataset.resources",
+    "simgen.spec.recipe_files",
     "simgen.spec.sweeps",
 }
 

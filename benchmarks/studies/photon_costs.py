@@ -17,7 +17,7 @@ from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.types.camera_grid import CameraGrid
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

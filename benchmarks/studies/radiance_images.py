@@ -13,7 +13,7 @@ from benchmarks.timing import median_of, side_by_side
 from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,7 +16,9 @@ from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.scenes import film
 from benchmarks.skip_pairs import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.drawn.kinds import FIRST_UNSEEN
+from simgen.spec.recipe import Recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +29,6 @@ LITTLE_PERCENT = 5.0
 """A skip that saves less is not worth its code."""
 KINDS = "plain", "textured", "cards", "room", "crossing", "leaves", "checks", "shiny"
 """Kinds of drawn scenes that studies are of."""
-FIRST_NUMBER = 100
-"""Numbers of drawn scenes from here on are for figures, those below for tuning."""
-
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {"scenes": 4, "side_px": 96, "realistic_px": 256, "repeats": 3},
@@ -92,7 +91,7 @@ def random_world(number: int, side_px: int, folder: Path) -> World:
     recipe = Recipe.model_validate(
         {
             "scene": f"drawn_{rng.choice(KINDS)}",
-            "scene_number": int(FIRST_NUMBER + rng.integers(1000)),
+            "scene_number": int(FIRST_UNSEEN + rng.integers(1000)),
             "seed": number,
             "grid": {
                 "rows": rows,
