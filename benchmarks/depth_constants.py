@@ -21,7 +21,7 @@ from pcii.evaluation.measurement import tasks_of
 from pcii.evaluation.method_names import NamedMethod
 from pcii.evaluation.tables import light_name
 from pcii.figures.pages import table_markdown, text_table
-from pcii.removal.posterior_masks import masks_of
+from pcii.removal.methods import masks_of
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.photon_limit import Light
 

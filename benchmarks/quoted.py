@@ -18,8 +18,7 @@ from benchmarks.studies import photon_costs
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.frames import frame_of
-from pcii.evaluation.rows import origin_of, read_rows
+from pcii.evaluation.rows import frame_of, origin_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.evaluation.summary import lines_of, means, means_over_scenes
 from pcii.store.collection import IN_FRAMES
