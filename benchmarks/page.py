@@ -60,16 +60,16 @@ def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
     """The tables of a study by title, with a column for each parameter and quantity that any row has."""
     tables: dict[str, DataFrame] = {}
     for title in dict.fromkeys(row.table for row in rows):
-        own = [row for row in rows if row.table == title]
-        parameters = list(dict.fromkeys(name for row in own for name in row.parameters))
-        quantities = list(dict.fromkeys(name for row in own for name in row.values))
+        of_table = [row for row in rows if row.table == title]
+        parameters = list(dict.fromkeys(name for row in of_table for name in row.parameters))
+        quantities = list(dict.fromkeys(name for row in of_table for name in row.values))
         cells = [
             (
                 row.name,
                 *(_parameter(row.parameters.get(name)) for name in parameters),
                 *(told(row.values.get(name)) for name in quantities),
             )
-            for row in own
+            for row in of_table
         ]
         tables[title] = text_table(cells, ("what", *map(label, (*parameters, *quantities))))
     return tables

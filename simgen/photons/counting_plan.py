@@ -88,12 +88,12 @@ class Probe(NamedTuple):
         )
 
 
-def probe(capture: Capture, seed: int, found: Sequence[BrightLight] = ()) -> Probe:
+def probe(capture: Capture, seed: int, known_rows: Sequence[BrightLight] = ()) -> Probe:
     """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise.
 
-    What is known of bright light and its paths have likely not met is added, or what an exploration `found`
-    of it, whichever has more noise: light that fills n pixels with the radiance L adds n L to the sum over
-    the pixels, and n L^2 to the variance.
+    What is known of bright light and its paths have likely not met is added, or what an exploration found of
+    it, `known_rows`, whichever has more noise: light that fills n pixels with the radiance L adds n L to the
+    sum over the pixels, and n L^2 to the variance.
     """
     grid = capture.grid
     small, pixels = replace(capture.coarse_grid, rows=1, cols=1), grid.height * grid.width
@@ -111,7 +111,7 @@ def probe(capture: Capture, seed: int, found: Sequence[BrightLight] = ()) -> Pro
     film_light, paths = mean * pixels, 2 * PROBE_SAMPLES * small.height * small.width
     known = straight_light(capture) + lit_light(sampler_of_films(capture), film_light, paths)[0]
     known += mirrored_light(capture, film_light, paths, with_straight=True)
-    bright = max(known, list(found), key=_noise)
+    bright = max(known, list(known_rows), key=_noise)
     missed = _missed(bright, paths, pixels)
     # Of light in a single pixel two halves tell the variance badly, even if both have met it.
     variance = max(float(variance) + _noise(missed) / pixels, _noise(bright) / pixels)
@@ -177,10 +177,11 @@ def _pixels(capture: Capture) -> int:
 
 
 def _plan_by_probe(
-    capture: Capture, kind: str, min_samples: int, why_rendered: str, found: Sequence[BrightLight] = ()
+    capture: Capture, kind: str, min_samples: int, why_rendered: str, bright_light: Sequence[BrightLight] = ()
 ) -> Plan:
-    """The cheaper way, or with a reason `why_rendered` the dense one; see `probe` for what was `found`."""
-    probed, pixels, views = probe(capture, PROBE_SEED, found), _pixels(capture), capture.grid.view_count
+    """The cheaper way, or with a reason `why_rendered` the dense one; see `probe` for `bright_light`."""
+    probed = probe(capture, PROBE_SEED, bright_light)
+    pixels, views = _pixels(capture), capture.grid.view_count
     photons, gain = _photons_and_gain(capture, probed)
     samples = max(probed.samples_for(gain, capture.budget_pixels), min_samples)
     if capture.photons.nested and not _are_few(capture, photons):

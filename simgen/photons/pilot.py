@@ -107,10 +107,10 @@ def send_pilot(capture: Capture, emission: EmissionSampler) -> Pilot:
         openings, traced = _look_for_openings(sampler, Samples.joined(samples).z_mm, contrast)
         samples.append(openings)
         paths += traced
-    seen = Samples.joined(samples)
-    layers = layers_for(capture.grid, tile_px_for(capture.grid, rays), seen.z_mm)
+    joined = Samples.joined(samples)
+    layers = layers_for(capture.grid, tile_px_for(capture.grid, rays), joined.z_mm)
     paths += sampler.count_paths(rays + aimed.view.size, followed + aimed.view.size)
-    return pilot._replace(majorant=fit(capture.grid, layers, seen, dim), paths=paths)
+    return pilot._replace(majorant=fit(capture.grid, layers, joined, dim), paths=paths)
 
 
 def _meet_bright_light(
@@ -131,26 +131,28 @@ def _meet_bright_light(
     mirrored = mirrored_light(capture, film_light, paths, with_straight=False)
     film_light += sum(light.light for light in lit + mirrored)
     pixels, images = capture.grid.height * capture.grid.width, None
-    seen = [row for row in mirrored if row.arrivals is not None and row.hits(paths, pixels) < SURE_HITS]
+    lamps = [row for row in mirrored if row.arrivals is not None and row.hits(paths, pixels) < SURE_HITS]
     # What surfaces scatter a rehearsal finds as well.
     scattered, all_paths = [row for row in mirrored if row.arrivals is None], sum(known_paths)
     unmet = [row for row in scattered if row.hits(all_paths, pixels) < SURE_HITS]
-    if seen and isinstance(sampler, WavefrontSampler):
-        images = find_images(sampler, seen)
+    if lamps and isinstance(sampler, WavefrontSampler):
+        images = find_images(sampler, lamps)
     known = KnownPlaces([emission] if images is None else [emission, images])
     if images is None:
-        unmet += seen
+        unmet += lamps
     else:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=1 << 20)
-        found = images.light_by_bounces(AIMED_RAYS, path_seed)
-        sent = np.bincount([row.bounces for row in seen], [row.light for row in seen], minlength=found.size)
+        light_by_bounces = images.light_by_bounces(AIMED_RAYS, path_seed)
+        bounces, light = [row.bounces for row in lamps], [row.light for row in lamps]
+        sent = np.bincount(bounces, light, minlength=light_by_bounces.size)
         # What the cameras see of a lamp differs from what arrives around them, but not by a half.
-        hidden = [row for row in seen if found[row.bounces] < MIN_FOUND_SHARE * sent[row.bounces]]
+        is_missing = light_by_bounces < MIN_FOUND_SHARE * sent
+        hidden = [row for row in lamps if is_missing[row.bounces]]
         if sum(row.light for row in hidden) > MAX_HIDDEN_SHARE * film_light:
-            return known, lit + seen, hidden, traced
+            return known, lit + lamps, hidden, traced
     if sum(row.light for row in unmet) <= LEAST_SHARE * film_light:
         unmet = []
-    return known, lit + seen, unmet, traced
+    return known, lit + lamps, unmet, traced
 
 
 def _send_first_pilot(sampler: CandidateSampler) -> tuple[Samples, int]:
@@ -197,11 +199,11 @@ def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: fl
         return openings, rays
     rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=4)
     cells = np.unique(np.stack([openings.row, openings.col]) // 2, axis=1, return_index=True)[1]
-    seen = openings.take(rng.permutation(cells)[:MAX_OPENINGS])
-    guesses = int(np.clip(GUESSES // (seen.k.size * grid.view_count), *GUESSES_PER_VIEW))
+    sources = openings.take(rng.permutation(cells)[:MAX_OPENINGS])
+    guesses = int(np.clip(GUESSES // (sources.k.size * grid.view_count), *GUESSES_PER_VIEW))
     each = guesses * grid.view_count
-    k, l, row, col = (part.repeat(each) for part in (seen.k, seen.l, seen.row, seen.col))
-    view = np.tile(np.arange(grid.view_count).repeat(guesses), seen.k.size)
+    k, l, row, col = (part.repeat(each) for part in (sources.k, sources.l, sources.row, sources.col))
+    view = np.tile(np.arange(grid.view_count).repeat(guesses), sources.k.size)
     per_mm = grid.focal_mm / grid.pixel_mm / rng.choice(depths_mm, view.size)
     down, right = OPENING_SPREAD_PX * (2 * rng.random((2, view.size)) - 1)
     row = row + 0.5 + down - (view // grid.cols - k) * (grid.pitch_mm[1] * per_mm - grid.shear_px[1])
