@@ -38,7 +38,7 @@ def _section(study: Study, record: Record) -> str:
     measured, machine = record.measured, record.machine
     tables = tables_of(measured.rows)
     if measured.ratios:
-        ratios = [(name, told(ratio)) for name, ratio in measured.ratios.items()]
+        ratios = [(name, value_text(ratio)) for name, ratio in measured.ratios.items()]
         tables["Ratios"] = text_table(ratios, ("how many times better, side by side", "ratio"))
     seeds = f", seeds {', '.join(map(str, measured.seeds))}" if measured.seeds else ""
     parts = [f"## {study.title}", f"![{study.title}]({PICTURES}/{study.name}.png)", study.reading(measured)]
@@ -67,7 +67,7 @@ def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
             (
                 row.name,
                 *(_parameter(row.parameters.get(name)) for name in parameters),
-                *(told(row.values.get(name)) for name in quantities),
+                *(value_text(row.values.get(name)) for name in quantities),
             )
             for row in of_table
         ]
@@ -75,10 +75,10 @@ def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
     return tables
 
 
-def told(value: Value | None) -> str:
+def value_text(value: Value | None) -> str:
     """A value to three digits, with its interval in brackets; a dash for none.
 
-    >>> told(Value(1234.5, 1200.0, 1300.0)), told(Value(0.01)), told(None)
+    >>> value_text(Value(1234.5, 1200.0, 1300.0)), value_text(Value(0.01)), value_text(None)
     ('1230 (1200 to 1300)', '0.01', '–')
     """
     if value is None:

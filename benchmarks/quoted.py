@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.machine import commit, in_words
-from benchmarks.page import told
+from benchmarks.page import value_text
 from benchmarks.results import UNITS, Record, Value, value_of
 from benchmarks.studies import photon_costs
 from pcii.base.errors import InputError
@@ -44,7 +44,7 @@ def text_of(name: str, value: Value) -> str:
     parts = name.split(".")
     ends = [part.rpartition("_")[2] for part in parts if "_" in part]
     unit = "×" if parts[-1].startswith("against_") else "".join(UNITS.get(end, "") for end in ends)
-    number, _, interval = told(value).partition(" ")
+    number, _, interval = value_text(value).partition(" ")
     return " ".join(part for part in (number, unit, interval) if part)
 
 
