@@ -28,19 +28,19 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(studies)}; guard; publish")
     parser.add_argument("--full", action="store_true", help="full size: hours instead of minutes")
     parser.add_argument("--out", type=Path, default=Path("out/bench"), help="folder of results (%(default)s)")
-    given = parser.parse_args()
+    options = parser.parse_args()
     try:
-        if given.names == ["guard"]:
-            return guard(given.out)
-        if given.names == ["publish"]:
-            return publish(given.out)
-        for name in given.names:
+        if options.names == ["guard"]:
+            return guard(options.out)
+        if options.names == ["publish"]:
+            return publish(options.out)
+        for name in options.names:
             if name not in studies:
                 raise InputError(f"NAME: there is no study named {name!r}; use {', '.join(studies)}")
-        for name in given.names or studies:
-            measure(studies[name], "full" if given.full else "quick", given.out)
-        write_page(given.out / PAGE.name, STUDIES, records_in(given.out))
-        print(f"The page is {given.out / PAGE.name}.")
+        for name in options.names or studies:
+            measure(studies[name], "full" if options.full else "quick", options.out)
+        write_page(options.out / PAGE.name, STUDIES, records_in(options.out))
+        print(f"The page is {options.out / PAGE.name}.")
     except InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2

@@ -21,7 +21,7 @@ from pcii.evaluation.measurement import tasks_of
 from pcii.evaluation.method_names import NamedMethod
 from pcii.evaluation.tables import light_name
 from pcii.figures.pages import table_markdown, text_table
-from pcii.removal.posterior_masks import masks_of
+from pcii.removal.methods import masks_of
 from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.photon_limit import Light
 
@@ -38,22 +38,22 @@ def main() -> int:
     options = parser.parse_args()
     methods = dict(variants(options.part or PARTS))
     try:
-        chosen = [Light.parse(budget) for budget in options.budget or ()]
+        lights_of_options = [Light.parse(budget) for budget in options.budget or ()]
         datasets = [pcii.open_dataset(folder) for folder in find_datasets(options.folders)]
-        tasks = tasks_of(datasets, [NamedMethod("posterior")], chosen)
-        found: dict[tuple[str, str], list[tuple[float, ...]]] = {}
+        tasks = tasks_of(datasets, [NamedMethod("posterior")], lights_of_options)
+        scores: dict[tuple[str, str], list[tuple[float, ...]]] = {}
         with Stages() as report:
             for number, task in enumerate(tasks):
                 data = task.data
                 for done, (name, method) in enumerate(methods.items(), start=1):
-                    found.setdefault((name, str(task.light)), []).append(_scores(data, method))
+                    scores.setdefault((name, str(task.light)), []).append(_scores(data, method))
                     report("constants", number * len(methods) + done, len(tasks) * len(methods))
     except pcii.InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2
 
     def cell(name: str, light: str) -> str:
-        return ", ".join(f"{mean:.3f}" for mean in np.mean(found[name, light], axis=0))
+        return ", ".join(f"{mean:.3f}" for mean in np.mean(scores[name, light], axis=0))
 
     lights = list(dict.fromkeys(str(task.light) for task in tasks))
     rows = [(name, *(cell(name, light) for light in lights)) for name in methods]

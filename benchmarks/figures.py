@@ -88,10 +88,10 @@ def _plain(axes: "Axes") -> None:
 
 
 def _value(row: Row, quantity: Quantity) -> Value | None:
-    found: Any = (
+    value: Any = (
         quantity(row) if callable(quantity) else row.values.get(quantity, row.parameters.get(quantity))
     )
-    return found if isinstance(found, Value) or found is None else Value(float(found))
+    return value if isinstance(value, Value) or value is None else Value(float(value))
 
 
 def _bars(values: Sequence[Value]) -> list[list[float]]:

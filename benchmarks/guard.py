@@ -34,7 +34,7 @@ def losses(records: Iterable[Record], reference: Mapping[str, Any]) -> list[str]
 
     Studies of another size than the table's, and those that did not run, are not compared.
     """
-    found: list[str] = []
+    losses: list[str] = []
     for record in records:
         entry = reference.get(record.study)
         if entry is None or entry["size"] != record.size:
@@ -42,10 +42,10 @@ def losses(records: Iterable[Record], reference: Mapping[str, Any]) -> list[str]
         for name, before in entry["ratios"].items():
             now = record.measured.ratios.get(name)
             if now is None:
-                found.append(f"{record.study}, {name}: was {before:.3g} and is not measured any more")
+                losses.append(f"{record.study}, {name}: was {before:.3g} and is not measured any more")
             elif not now.value >= (1 - LOSS) * before:
                 lost = 1 - now.value / before
-                found.append(
+                losses.append(
                     f"{record.study}, {name}: {now.value:.3g} instead of {before:.3g}, {lost:.0%} less"
                 )
-    return found
+    return losses

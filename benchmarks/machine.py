@@ -53,12 +53,12 @@ def was_busy(found: Mapping[str, Any]) -> bool:
 
 def versions() -> dict[str, str]:
     """Commit, and versions of Python and all packages that are measured; of extras, those installed."""
-    found = {"commit": commit(), "python": platform.python_version(), **dataset_versions()}
-    found |= {name: version(name) for name in PEERS}
+    versions_by_name = {"commit": commit(), "python": platform.python_version(), **dataset_versions()}
+    versions_by_name |= {name: version(name) for name in PEERS}
     for name in EXTRAS:
         if has(name):
-            found[name] = version(name)
-    return found
+            versions_by_name[name] = version(name)
+    return versions_by_name
 
 
 def has(package: str) -> bool:

@@ -38,7 +38,7 @@ def _section(study: Study, record: Record) -> str:
     measured, machine = record.measured, record.machine
     tables = tables_of(measured.rows)
     if measured.ratios:
-        ratios = [(name, told(ratio)) for name, ratio in measured.ratios.items()]
+        ratios = [(name, value_text(ratio)) for name, ratio in measured.ratios.items()]
         tables["Ratios"] = text_table(ratios, ("how many times better, side by side", "ratio"))
     seeds = f", seeds {', '.join(map(str, measured.seeds))}" if measured.seeds else ""
     parts = [f"## {study.title}", f"![{study.title}]({PICTURES}/{study.name}.png)", study.reading(measured)]
@@ -60,25 +60,25 @@ def tables_of(rows: Sequence[Row]) -> dict[str, "DataFrame"]:
     """The tables of a study by title, with a column for each parameter and quantity that any row has."""
     tables: dict[str, DataFrame] = {}
     for title in dict.fromkeys(row.table for row in rows):
-        own = [row for row in rows if row.table == title]
-        parameters = list(dict.fromkeys(name for row in own for name in row.parameters))
-        quantities = list(dict.fromkeys(name for row in own for name in row.values))
+        of_table = [row for row in rows if row.table == title]
+        parameters = list(dict.fromkeys(name for row in of_table for name in row.parameters))
+        quantities = list(dict.fromkeys(name for row in of_table for name in row.values))
         cells = [
             (
                 row.name,
                 *(_parameter(row.parameters.get(name)) for name in parameters),
-                *(told(row.values.get(name)) for name in quantities),
+                *(value_text(row.values.get(name)) for name in quantities),
             )
-            for row in own
+            for row in of_table
         ]
         tables[title] = text_table(cells, ("what", *map(label, (*parameters, *quantities))))
     return tables
 
 
-def told(value: Value | None) -> str:
+def value_text(value: Value | None) -> str:
     """A value to three digits, with its interval in brackets; a dash for none.
 
-    >>> told(Value(1234.5, 1200.0, 1300.0)), told(Value(0.01)), told(None)
+    >>> value_text(Value(1234.5, 1200.0, 1300.0)), value_text(Value(0.01)), value_text(None)
     ('1230 (1200 to 1300)', '0.01', '–')
     """
     if value is None:

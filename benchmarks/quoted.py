@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.machine import commit, in_words
-from benchmarks.page import told
+from benchmarks.page import value_text
 from benchmarks.results import UNITS, Record, Value, value_of
 from benchmarks.studies import photon_costs
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.frames import frame_of
-from pcii.evaluation.rows import origin_of, read_rows
+from pcii.evaluation.rows import frame_of, origin_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.evaluation.summary import lines_of, means, means_over_scenes
 from pcii.store.collection import IN_FRAMES
@@ -45,7 +44,7 @@ def text_of(name: str, value: Value) -> str:
     parts = name.split(".")
     ends = [part.rpartition("_")[2] for part in parts if "_" in part]
     unit = "×" if parts[-1].startswith("against_") else "".join(UNITS.get(end, "") for end in ends)
-    number, _, interval = told(value).partition(" ")
+    number, _, interval = value_text(value).partition(" ")
     return " ".join(part for part in (number, unit, interval) if part)
 
 

@@ -125,8 +125,8 @@ def mean_of(samples: Iterable[float]) -> Value:
 
 def value_of(mean: Any, scale: float = 1.0) -> Value:
     """A mean of `pcii.evaluation` times `scale`; that of one sample has no interval."""
-    found = scale * mean.mean
-    return Value(found) if mean.n == 1 else Value(found, scale * mean.low, scale * mean.high)
+    value = scale * mean.mean
+    return Value(value) if mean.n == 1 else Value(value, scale * mean.low, scale * mean.high)
 
 
 def write_record(folder: Path, record: Record) -> None:
@@ -141,8 +141,8 @@ def read_record(path: Path) -> Record:
         content = json.loads(path.read_text(encoding="utf-8"))
         measured = content.pop("measured")
         rows = [Row(**row | {"values": _values_of(row["values"])}) for row in measured["rows"]]
-        own = Measured(rows, _values_of(measured["ratios"]), measured["seeds"])
-        return Record(**content, measured=own)
+        measurements = Measured(rows, _values_of(measured["ratios"]), measured["seeds"])
+        return Record(**content, measured=measurements)
     except (ValueError, TypeError, KeyError, AttributeError) as fault:
         raise InputError(
             f"{path}: expected results of a study, as `make bench` writes them ({fault})"

@@ -2,20 +2,15 @@
 
 from pathlib import Path
 
+from simgen.dataset.prepared import prepare
 from simgen.photons.capture import Capture
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
-from simgen.sensor.detector import sensitivities
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene_lookup import load_scene
 
 
 def capture_of(recipe: Recipe) -> Capture:
-    """The recipe's scene as perfect cameras see it."""
-    scene = load_scene(recipe.scene)
-    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
-    built = build(mi, scene, scene.folder or Path(), recipe.render.max_depth, curves)
-    return Capture(built, recipe.grid.camera_grid(), recipe.cfa, recipe.photons)
+    """The recipe's scene as its cameras see it."""
+    prepared = prepare(recipe, Path())
+    return prepared.capture(prepared.render_scene())
 
 
 def film(side_px: int) -> list[str]:

@@ -100,9 +100,9 @@ class World:
     @cached_property
     def reuse(self) -> Reuse:
         """What is left of the dataset that was made first, in the folder "first"."""
-        kept = Reuse()
-        self.made("first", kept)
-        return kept
+        reuse = Reuse()
+        self.made("first", reuse)
+        return reuse
 
     @cached_property
     def planes(self) -> FocalPlanes:
@@ -112,9 +112,9 @@ class World:
     def made(self, name: str, reuse: Reuse | None = None, **products: object) -> Path:
         """A new dataset of the recipe with other products; the folder must not exist yet."""
         changed = self.recipe.products.model_copy(update=products)
-        own = self.prepared.recipe.model_copy(update={"products": changed})
+        recipe = self.prepared.recipe.model_copy(update={"products": changed})
         folder = self.folder / name
-        make(replace(self.prepared, recipe=own), folder, silent, reuse or Reuse())
+        make(replace(self.prepared, recipe=recipe), folder, silent, reuse or Reuse())
         return folder
 
 
@@ -177,8 +177,8 @@ def _dense(world: World) -> Arrays:
 
 def _second(world: World, name: str, reuse: Reuse) -> Arrays:
     """A dataset that differs from `world.first` in its seed alone, made with what that one left."""
-    own = world.prepared.recipe.model_copy(update={"seed": world.recipe.seed + 1})
-    make(replace(world.prepared, recipe=own), world.folder / name, silent, reuse)
+    recipe = world.prepared.recipe.model_copy(update={"seed": world.recipe.seed + 1})
+    make(replace(world.prepared, recipe=recipe), world.folder / name, silent, reuse)
     return content_of(world.folder / name)
 
 

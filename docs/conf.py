@@ -67,8 +67,8 @@ def setup(app: Any) -> None:
 def _names_and_defaults(app: Any, what: str, name: str, kind: Any, *_: Any) -> tuple[str, None] | None:
     if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
         return None
-    given = [one.replace(annotation=one.empty) for one in signature(kind).parameters.values()]
-    return str(Signature(given)), None
+    parameters = [one.replace(annotation=one.empty) for one in signature(kind).parameters.values()]
+    return str(Signature(parameters)), None
 
 
 def _leave_out_rules(app: Any, domain: str, what: str, content: nodes.Element) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from simgen.app.pictures import draw_preview
 from simgen.check.targets import load_target
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 from simgen.spec.scene_lookup import load_scene
 
 DOCS = Path(__file__).resolve().parent
@@ -39,8 +39,8 @@ def page() -> str:
     for name in scene_names():
         scene = load_scene(str(SCENES / name))
         purpose = " ".join(scene.description.split())
-        made = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
-        parts.append(f"## {name}\n\n{purpose}{made}\n\n![{scene.title}](gallery/{name}.jpg)\n")
+        recipes_text = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
+        parts.append(f"## {name}\n\n{purpose}{recipes_text}\n\n![{scene.title}](gallery/{name}.jpg)\n")
     return "\n".join(parts)
 
 

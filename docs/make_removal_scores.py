@@ -14,8 +14,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.frames import frame_of
-from pcii.evaluation.rows import read_rows
+from pcii.evaluation.rows import frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION
 from pcii.evaluation.summary import means, with_yardsticks
 from pcii.figures.charts import quiet_grid

@@ -13,7 +13,7 @@ from .spec.materials import Checks as Checks, Edge as Edge, Emission as Emission
 from .spec.materials import Material as Material, Matt as Matt, Metal as Metal, Noise as Noise
 from .spec.materials import Plastic as Plastic, Principled as Principled, Spectrum as Spectrum, Star as Star
 from .spec.materials import Stripes as Stripes, Text as Text
-from .spec.recipe import CalibrationErrors as CalibrationErrors, Lens as Lens, RecipeFile as RecipeFile
-from .spec.recipe import Sensor as Sensor, load_recipe as load_recipe
+from .spec.recipe import CalibrationErrors as CalibrationErrors, Lens as Lens, Sensor as Sensor
+from .spec.recipe_files import RecipeFile as RecipeFile, load_recipe as load_recipe
 from .spec.scene import Backdrop as Backdrop, Scene as Scene, SceneObject as SceneObject
 from .spec.shapes import Box as Box, Card as Card, Cylinder as Cylinder, Mesh as Mesh, Sphere as Sphere

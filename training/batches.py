@@ -128,11 +128,11 @@ def _draw_part(example: dict[str, Tensor], side: int, rng: np.random.Generator) 
     is_transposed = rng.random() < 0.5
     part = {"light": example["light"].to(DEVICE)}
     for name in SAMPLES_PER_BLOCK:
-        own = window(name, example[name], top, left, side)
+        values = window(name, example[name], top, left, side)
         if SAMPLES_PER_BLOCK[name] == PIXELS:
-            own = own[down::PIXELS, right::PIXELS]
-        own = own.to(DEVICE, non_blocking=True).flip(flips)
-        part[name] = own.mT if is_transposed else own
+            values = values[down::PIXELS, right::PIXELS]
+        values = values.to(DEVICE, non_blocking=True).flip(flips)
+        part[name] = values.mT if is_transposed else values
     return part
 
 

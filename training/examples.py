@@ -115,9 +115,9 @@ def plane_of(planes: FocalPlanes, total_px: np.ndarray) -> np.ndarray:
 def objects_of(object_id: np.ndarray, ids: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Median plane, planes between the 2nd and 98th percentile, share of the film: (N, 3) float32."""
     rows = []
-    for own in (place[object_id == each] for each in ids):
-        low, middle, high = np.percentile(own[np.isfinite(own)], [2, 50, 98])
-        rows.append((middle, high - low, own.size / place.size))
+    for planes_of_object in (place[object_id == each] for each in ids):
+        low, middle, high = np.percentile(planes_of_object[np.isfinite(planes_of_object)], [2, 50, 98])
+        rows.append((middle, high - low, planes_of_object.size / place.size))
     return np.array(rows, np.float32).reshape(-1, 3)
 
 

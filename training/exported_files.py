@@ -54,8 +54,8 @@ def load_exported(network: SurfaceNetwork, folder: Path) -> None:
     from onnx import numpy_helper  # pyright: ignore[reportMissingImports]
 
     for part, name in ((network.trunk, "trunk"), (network.head, "head")):
-        own = part.state_dict()
+        weights = part.state_dict()
         for one in onnx.load(folder / f"{name}.onnx").graph.initializer:
-            if one.name in own:
-                own[one.name] = torch.from_numpy(numpy_helper.to_array(one).copy())
-        part.load_state_dict(own)
+            if one.name in weights:
+                weights[one.name] = torch.from_numpy(numpy_helper.to_array(one).copy())
+        part.load_state_dict(weights)

@@ -82,8 +82,8 @@ class Training:
         self.steps += 1
         average = min(AVERAGE, self.steps / (self.steps + 10))
         with torch.no_grad():
-            for mean, own in zip(self.averaged.parameters(), self.network.parameters(), strict=True):
-                mean.lerp_(own, 1 - average)
+            for mean, weight in zip(self.averaged.parameters(), self.network.parameters(), strict=True):
+                mean.lerp_(weight, 1 - average)
         return loss.detach()
 
     def _write(self, losses: list[Tensor], examples: Examples) -> None:

@@ -106,14 +106,14 @@ class Trunk(nn.Module):
         parts = [f.avg_pool2d(evidence, 2), cell_brightness, coverage, surface / 4, level]
         of_planes = self.hint(hint).flatten(0, 1)[:, :, None, None]
         fine = x = f.relu(self.stem(torch.stack(parts, dim=2).flatten(0, 1)) + of_planes)
-        kept = []
+        finer = []
         for down, blocks in zip(self.down, self.before, strict=False):
             x = blocks(down(x), films)
-            kept.append(x)
+            finer.append(x)
         x = self.coarsest(self.down[-1](x), films)
-        for place in reversed(range(len(kept))):
+        for place in reversed(range(len(finer))):
             wider = f.interpolate(self.up[place + 1](x), scale_factor=2.0, mode="nearest")
-            x = self.after[place](kept[place] + wider, films)
+            x = self.after[place](finer[place] + wider, films)
         x = f.relu(fine + f.interpolate(self.up[0](x), scale_factor=2.0, mode="nearest"))
         x = x + f.relu(self.last(x))
         logit = self.logit(x) + self.trust * surface.flatten(0, 1)[:, None]
@@ -134,8 +134,8 @@ class Head(nn.Module):
 
     def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor]:
         features, cell_logit, cell_mask, evidence, brightness = inputs
-        own = evidence[:, :, None]
-        of_blocks = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
+        blocks = evidence[:, :, None]
+        of_blocks = torch.cat([blocks, moved(blocks, 1), moved(blocks, -1), brightness[:, :, None]], dim=2)
         x = torch.cat([f.pixel_shuffle(self.spread(features), 2), of_blocks.flatten(0, 1)], dim=1)
         x = f.relu(self.mix(x))
         logits = self.logit(x) + f.interpolate(cell_logit, scale_factor=2.0, mode="nearest")

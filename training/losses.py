@@ -57,5 +57,5 @@ def mask_loss(masks: Tensor, depth: Tensor, planes: Tensor, target: Tensor) -> T
     if not is_counted.any():
         return 0 * masks.sum()
     log_probability = mask_log_probability(masks, depth, planes)
-    own = log_probability.gather(1, target.clamp(min=0)[:, None])[:, 0]
-    return -own[is_counted].mean()
+    log_of_target = log_probability.gather(1, target.clamp(min=0)[:, None])[:, 0]
+    return -log_of_target[is_counted].mean()

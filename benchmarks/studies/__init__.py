@@ -2,7 +2,7 @@
 
 photon_images     Photon counts by thinning and by dense rendering, and how far they are from the truth.
 photon_costs      What a photon costs at the paper's size, and how that grows.
-radiance_images   Renderings by samples, lengths of paths, modes of the renderer, and a denoiser.
+radiance_images   Rendered views by samples per pixel, against a long rendering.
 sections          Errors of sections of a known texture, ours and other packages'.
 depth_and_focus   Depth and removal by every method over photon budgets.
 skips             Work that is skipped: on against off.

@@ -86,8 +86,8 @@ def _rows(means: "DataFrame") -> list[Row]:
     rows: list[Row] = []
     bounds: dict[tuple[str, float], Row] = {}
     groups: Any = means.groupby(["scene", "light", "method"], observed=True)
-    for (scene, light, method), own in groups:
-        of = {row.measure: row for row in lines_of(own)}
+    for (scene, light, method), group in groups:
+        of = {row.measure: row for row in lines_of(group)}
         where: dict[str, Parameter] = {"scene": scene, "photons_per_view": float(light)}
         is_depth = estimator_of(method) is not None
         columns = {"time_ms": "seconds"} | (MEASURES if is_depth else MASKS)
@@ -110,12 +110,12 @@ def _ratios(rows: list[Row]) -> dict[str, Value]:
     for row in measured.of(DEPTH):
         if row.name == DEFAULT:
             others = [each for each in measured.of(DEPTH, **row.parameters) if each.name in sweeps]
-            own, best = (
+            ours, best = (
                 max(MIN_PERCENT, *(each.values["within_1px_percent"].value for each in some))
                 for some in ([row], others)
             )
             name = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons: depths within"
-            ratios[f"{name} 1 px by {DEFAULT} against the best sweep"] = Value(own / best)
+            ratios[f"{name} 1 px by {DEFAULT} against the best sweep"] = Value(ours / best)
     return ratios
 
 

@@ -19,7 +19,7 @@ from benchmarks.figures import bars
 from benchmarks.results import Measured, Row, Size, Study, Value
 from benchmarks.scenes import film
 from benchmarks.timing import median_of, ratio_of
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,19 +80,19 @@ def measure(rows: int, side_px: int, repeats: int) -> Measured:
                         peaks.setdefault(part, []).append(each.peak_mb)
                 for stage, taken in (seconds | {ASIDE: total - sum(seconds.values())}).items():
                     stages.setdefault((name, stage), []).append(taken)
-    found = [Row(WHOLE, name, {}, {"time_s": _spread(taken)}) for name, taken in totals.items()]
-    found += [Row("Peak memory", part, {}, {"peak_mb": Value(max(taken))}) for part, taken in peaks.items()]
-    found += [
+    results = [Row(WHOLE, name, {}, {"time_s": _spread(taken)}) for name, taken in totals.items()]
+    results += [Row("Peak memory", part, {}, {"peak_mb": Value(max(mb))}) for part, mb in peaks.items()]
+    results += [
         Row(STAGES, name, {"stage": stage}, {"time_s": _spread(s)}) for (name, stage), s in stages.items()
     ]
     ratios = {f"{OWN} against {PLAIN}": ratio_of(totals[PLAIN], totals[OWN])}
-    return Measured(found, ratios, [load_recipe("paper")[0].seed])
+    return Measured(results, ratios, [load_recipe("paper")[0].seed])
 
 
 def _spread(samples: list[float]) -> Value:
     """The median, and the least and the most where there are too few runs for an interval."""
-    found = median_of(samples)
-    return found if found.low is not None else Value(found.value, min(samples), max(samples))
+    median = median_of(samples)
+    return median if median.low is not None else Value(median.value, min(samples), max(samples))
 
 
 def _ours(out: Path, rows: int, side_px: int, samples: int) -> tuple[dict[str, Finished], dict[str, float]]:
@@ -102,18 +102,19 @@ def _ours(out: Path, rows: int, side_px: int, samples: int) -> tuple[dict[str, F
     settings = [*film(side_px), *cameras, f"render.samples_per_pixel={samples}"]
     options = [part for setting in settings for part in ("--set", setting)]
     data, results = out / "data", out / "results"
-    made = run_process([str(BIN / "simgen"), "generate", "paper", "--out", str(data), *options])
+    generated = run_process([str(BIN / "simgen"), "generate", "paper", "--out", str(data), *options])
     analysed = run_process([sys.executable, "-c", ANALYSIS, str(data), str(results)])
     manifest: dict[str, Any] = json.loads((data / "manifest.json").read_text(encoding="utf-8"))
     stages = {f"data: {name}": seconds for name, seconds in manifest["timings_s"].items()}
     stages |= json.loads(analysed.output)
-    return {"simgen generate": made, "pcii run": analysed}, stages
+    return {"simgen generate": generated, "pcii run": analysed}, stages
 
 
 def _plain(out: Path, rows: int, side_px: int, samples: int) -> tuple[dict[str, Finished], dict[str, float]]:
     module = [sys.executable, "-m", "benchmarks.peers.plain_pipeline"]
-    given = {"folder": ROOT / "scenes" / "two_objects", "rows": rows, "side-px": side_px, "samples": samples}
-    options = [part for name, value in (given | {"out": out}).items() for part in (f"--{name}", str(value))]
+    values = {"folder": ROOT / "scenes" / "two_objects", "rows": rows, "side-px": side_px}
+    values |= {"samples": samples, "out": out}
+    options = [part for name, value in values.items() for part in (f"--{name}", str(value))]
     finished = run_process([*module, *options])
     return {PLAIN: finished}, json.loads(finished.output)
 
@@ -163,10 +164,10 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def reading(measured: Measured) -> str:
     """How to read it: both totals, and what the plain one leaves out."""
-    own, plain = (measured.one(WHOLE, name).values["time_s"].value for name in (OWN, PLAIN))
+    ours, plain = (measured.one(WHOLE, name).values["time_s"].value for name in (OWN, PLAIN))
     ratio = measured.ratios[f"{OWN} against {PLAIN}"].value
     return (
-        f"What does the whole job take, from a recipe to a report with masks, depth and scores? {own:.1f} s"
+        f"What does the whole job take, from a recipe to a report with masks, depth and scores? {ours:.1f} s"
         f" where a plain script takes {plain:.1f} s, {ratio:.2f} times"
         " as fast; bars are the median run, with the least and the most where runs are few. The plain"
         " script does less for its time: its counts have rendering noise, its masks are a threshold and"

@@ -17,7 +17,7 @@ from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from pcii.types.camera_grid import CameraGrid
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,12 +93,12 @@ def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> l
     base, more = (np.array(seconds[name]) for name in (BASE, BRIGHTER))
     one, sixteen = (scale * np.array(seconds[dense_name(samples)]) for samples in (1, 16))
     sample = (sixteen - one) / (15 * pixels)
-    found = {
+    costs = {
         "a photon more, by thinning": (more - base) / (9000 * grid.view_count),
         "a sample of a dense pixel": sample,
         "a dense pixel, without its samples": one / pixels - sample,
     }
-    return [Row(COSTS, name, {}, {"cost_us": median_of(list(each), 1e6)}) for name, each in found.items()]
+    return [Row(COSTS, name, {}, {"cost_us": median_of(list(each), 1e6)}) for name, each in costs.items()]
 
 
 def _growth(side_px: int, repeats: int, most: int) -> list[Row]:
@@ -109,8 +109,8 @@ def _growth(side_px: int, repeats: int, most: int) -> list[Row]:
     }
     capture = capture_of(recipes[10])
     works = {
-        n: lambda seed, own=own: thin_photons(replace(capture, photons=own.photons, seed=seed))
-        for n, own in recipes.items()
+        n: lambda seed, recipe=recipe: thin_photons(replace(capture, photons=recipe.photons, seed=seed))
+        for n, recipe in recipes.items()
     }
     return [
         Row(

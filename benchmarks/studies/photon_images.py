@@ -17,7 +17,7 @@ from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
 from simgen.photons.capture import Capture
 from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -172,10 +172,10 @@ def draw(figure: "Figure", measured: Measured) -> None:
         rows = measured.of(DISTANCES, scene=scene)
         ways = dict.fromkeys((row.name, row.parameters["samples"]) for row in rows)
         for number, (name, samples) in enumerate(ways):
-            own = [row for row in rows if (row.name, row.parameters["samples"]) == (name, samples)]
-            told = f"{name}, samples: {samples}" if samples else name
-            curve(times, own, "photons_per_view", "time_ms", told, number)
-            curve(excesses, own, "photons_per_view", _excess, "", number)
+            of_way = [row for row in rows if (row.name, row.parameters["samples"]) == (name, samples)]
+            label = f"{name}, samples: {samples}" if samples else name
+            curve(times, of_way, "photons_per_view", "time_ms", label, number)
+            curve(excesses, of_way, "photons_per_view", _excess, "", number)
         excesses.axhline(EXCESS, color="#8a94a6", linewidth=0.8, linestyle=":")
         frame(times, "photons_per_view", "time_ms", scene)
         frame(excesses, "photons_per_view", "dispersion - 1", log="x")
@@ -184,10 +184,10 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def _excess(row: Row) -> Value:
     """Dispersion above that of exact counts."""
-    found = row.values["dispersion"]
-    assert found.low is not None
-    assert found.high is not None
-    return Value(found.value - 1, found.low - 1, found.high - 1)
+    dispersion = row.values["dispersion"]
+    assert dispersion.low is not None
+    assert dispersion.high is not None
+    return Value(dispersion.value - 1, dispersion.low - 1, dispersion.high - 1)
 
 
 def reading(measured: Measured) -> str:
@@ -198,8 +198,8 @@ def reading(measured: Measured) -> str:
     samples = max(int(row.parameters["samples"]) for row in rows)
 
     def dispersion(way: str, scene: str, samples: int) -> float:
-        found = measured.one(DISTANCES, way, scene=scene, photons_per_view=most, samples=samples)
-        return found.values["dispersion"].value
+        row = measured.one(DISTANCES, way, scene=scene, photons_per_view=most, samples=samples)
+        return row.values["dispersion"].value
 
     return (
         "Which way of making photon counts is exact, and what does it cost? Counts are exact where the"

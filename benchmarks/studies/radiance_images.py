@@ -13,7 +13,7 @@ from benchmarks.timing import median_of, side_by_side
 from simgen.photons.capture import Capture
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
-from simgen.spec.recipe import load_recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,8 +39,8 @@ def measure(side_px: int, samples: Sequence[int], repeats: int, reference: int) 
         truth = rendered(capture, reference, seed=10_000).astype(np.float64)
         images: dict[int, list[np.ndarray]] = {number: [] for number in samples}
         works = {
-            number: lambda seed, own=own, n=number, capture=capture: own.append(rendered(capture, n, seed))
-            for number, own in images.items()
+            number: lambda seed, of=views, n=number, capture=capture: of.append(rendered(capture, n, seed))
+            for number, views in images.items()
         }
         for number, seconds in side_by_side(works, repeats).items():
             values = {"time_ms": median_of(seconds, 1e3)} | errors(np.array(images[number][1:]), truth)

@@ -70,7 +70,7 @@ class Texture:
         """What pixels about these rows (H,) and columns (W,) see: (H, W, 3), mean 0.5."""
         down = np.exp(2j * np.pi * np.outer(row_px, self.down) + 1j * self.phase)
         across = np.exp(2j * np.pi * np.outer(col_px, self.across))
-        colours = [((down * own) @ across.T).real for own in self.strength.T]
+        colours = [((down * strength) @ across.T).real for strength in self.strength.T]
         return 0.5 + np.stack(colours, axis=-1)
 
 
@@ -89,10 +89,10 @@ def plane_views(
     )
     pixels, images = np.arange(side_px), np.empty((len(cfas), *grid.shape_KLHW, 1), dtype=np.float32)
     for k, l in np.ndindex(10, 10):
-        seen = texture.seen_at(pixels + (k - 4.5) * disparity_px, pixels + (l - 4.5) * disparity_px)
-        for own, cfa in zip(images, cfas, strict=True):
-            own[k, l, ..., 0] = seen[..., 1] if cfa is None else mosaic(seen, cfa)
-    return [Views(own, grid, cfa) for own, cfa in zip(images, cfas, strict=True)]
+        picture = texture.seen_at(pixels + (k - 4.5) * disparity_px, pixels + (l - 4.5) * disparity_px)
+        for image, cfa in zip(images, cfas, strict=True):
+            image[k, l, ..., 0] = picture[..., 1] if cfa is None else mosaic(picture, cfa)
+    return [Views(image, grid, cfa) for image, cfa in zip(images, cfas, strict=True)]
 
 
 def measure(side_px: int, repeats: int, disparities: Sequence[float], budgets: Sequence[float]) -> Measured:
@@ -146,9 +146,9 @@ def _rows(
     seconds = side_by_side({name: lambda _, way=way: way() for name, way in ways.items()}, repeats)
     rows: list[Row] = []
     for name, way in ways.items():
-        found = way()
-        M = found.shape[0] // truths[1].shape[0]
-        values = {"time_ms": median_of(seconds[name], 1e3)} | errors(found, truths[M], BORDER_PX * M)
+        section = way()
+        M = section.shape[0] // truths[1].shape[0]
+        values = {"time_ms": median_of(seconds[name], 1e3)} | errors(section, truths[M], BORDER_PX * M)
         rows.append(Row(table, name, {"disparity_px": disparity}, values))
     return rows
 
@@ -184,8 +184,8 @@ def _photon_rows(texture: Texture, side_px: int, budgets: Sequence[float], repea
             counts = PhotonCounts.from_events(k, l, i, j, images[k, l, i, j], views.grid)
             taken = side_by_side({"events": lambda _, counts=counts: _estimate(counts)}, 1)
             seconds += taken["events"]
-            found = _estimate(counts) / scale
-            error.append(errors(found, truth, BORDER_PX)["rmse_percent"].value)
+            section = _estimate(counts) / scale
+            error.append(errors(section, truth, BORDER_PX)["rmse_percent"].value)
         values = {"time_ms": median_of(seconds, 1e3), "rmse_percent": mean_of(error)}
         rows.append(Row(BY_PHOTONS, "events", {"photons_per_view": budget}, values))
     return rows
@@ -204,7 +204,7 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def reading(measured: Measured) -> str:
     """How to read it, with figures of the plane of 13.3 px."""
-    own, peer = (
+    ours, peer = (
         measured.one(ONE_COLOUR, name, disparity_px=SHOWN_PX).values
         for name in ("nearest", "SciPy, bilinear")
     )
@@ -212,8 +212,8 @@ def reading(measured: Measured) -> str:
     few, *_, many = (row.values["rmse_percent"].value for row in measured.of(BY_PHOTONS))
     return (
         "Does interpolation pay? Further left and further down is better: with 100 cameras the roundings"
-        f" of nearest shifts cancel, so that they have an error of {own['rmse_percent'].value:.1f} % of the"
-        f" texture's contrast in {own['time_ms'].value:.1f} ms where bilinear ones by SciPy have"
+        f" of nearest shifts cancel, so that they have an error of {ours['rmse_percent'].value:.1f} % of the"
+        f" texture's contrast in {ours['time_ms'].value:.1f} ms where bilinear ones by SciPy have"
         f" {peer['rmse_percent'].value:.1f} % in {peer['time_ms'].value:.0f} ms; at a whole disparity,"
         f" where all round alike, nearest shifts are off by {whole['rmse_percent'].value:.0f} %. Sections"
         f" of photon counts have errors of {few:.0f} % down to {many:.0f} % as photons grow, beside which"

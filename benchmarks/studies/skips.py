@@ -16,7 +16,9 @@ from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.scenes import film
 from benchmarks.skip_pairs import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.drawn.kinds import FIRST_UNSEEN
+from simgen.spec.recipe import Recipe
+from simgen.spec.recipe_files import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +29,6 @@ LITTLE_PERCENT = 5.0
 """A skip that saves less is not worth its code."""
 KINDS = "plain", "textured", "cards", "room", "crossing", "leaves", "checks", "shiny"
 """Kinds of drawn scenes that studies are of."""
-FIRST_NUMBER = 100
-"""Numbers of drawn scenes from here on are for figures, those below for tuning."""
-
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {"scenes": 4, "side_px": 96, "realistic_px": 256, "repeats": 3},
@@ -62,12 +61,12 @@ def _timed_pair(skip: Skip, world: World, number: int, seconds: tuple[list[float
     """Add the seconds that a skip takes on and off; whether both give the same, if they are to."""
     # First the one, then the other, so that neither always finds what the other left in caches.
     turns = ((0, skip.on), (1, skip.off))
-    found: dict[int, Arrays] = {}
+    content: dict[int, Arrays] = {}
     for which, work in turns if number % 2 else turns[::-1]:
         start = time.perf_counter()
-        found[which] = work(world, f"{skip.name}, {number}, {which}")
+        content[which] = work(world, f"{skip.name}, {number}, {which}")
         seconds[which].append(time.perf_counter() - start)
-    return not skip.exact or are_same(found[0], found[1])
+    return not skip.exact or are_same(content[0], content[1])
 
 
 def _realistic_rows(skips: Sequence[Skip], side_px: int, repeats: int) -> list[Row]:
@@ -92,7 +91,7 @@ def random_world(number: int, side_px: int, folder: Path) -> World:
     recipe = Recipe.model_validate(
         {
             "scene": f"drawn_{rng.choice(KINDS)}",
-            "scene_number": int(FIRST_NUMBER + rng.integers(1000)),
+            "scene_number": int(FIRST_UNSEEN + rng.integers(1000)),
             "seed": number,
             "grid": {
                 "rows": rows,
@@ -156,10 +155,10 @@ def reading(measured: Measured) -> str:
     scenes = len(measured.seeds)
     hold = sum(row.parameters["scenes_where_it_holds"] == f"{scenes} of {scenes}" for row in exact)
     little = [row.name for row in rows if _saved(row) < LITTLE_PERCENT]
-    told = "all save more than that"
+    sentence = "all save more than that"
     if little:
         there = [f"{row.name} ({_saved(row):.0f} %)" for row in measured.of(REALISTIC)]
-        told = (
+        sentence = (
             f"less than {LITTLE_PERCENT:g} % is saved by {len(little)} of them. With the paper's cameras and"
             f" scene these save: {'; '.join(there)}"
         )
@@ -167,7 +166,7 @@ def reading(measured: Measured) -> str:
         f"Is skipped work really not missed? Of {len(exact)} skips that claim the same bytes, {hold} gave"
         f" them in all {scenes} random scenes; the other draws anew from the same distribution. Bars are"
         " the share of the time saved on these small scenes, where fixed costs weigh most, and the dotted"
-        f" line is {LITTLE_PERCENT:g} %: {told}."
+        f" line is {LITTLE_PERCENT:g} %: {sentence}."
     )
 
 

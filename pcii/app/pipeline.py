@@ -19,8 +19,7 @@ from pcii.depth.methods import (
 )
 from pcii.depth.posterior_depth import depth_map_of
 from pcii.metrics.scoring import score
-from pcii.removal.methods import DEFAULT_METHODS, find_method
-from pcii.removal.posterior_masks import masks_of
+from pcii.removal.methods import DEFAULT_METHODS, find_method, masks_of
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented

@@ -4,11 +4,10 @@ from .benchmark_scores import BenchmarkHalf as BenchmarkHalf, open_benchmark as 
 from .benchmark_scores import run_method as run_method, score_submission as score_submission
 from .comparison import Evaluation as Evaluation, evaluate as evaluate, find_datasets as find_datasets
 from .evaluation_page import write_evaluation as write_evaluation
-from .frames import frame_of as frame_of, read_frame as read_frame
 from .measurement import identity_of as identity_of, tasks_of as tasks_of
 from .method_names import NamedMethod as NamedMethod, depth_name as depth_name, named_methods as named_methods
 from .method_names import software_of as software_of
-from .rows import read_rows as read_rows
+from .rows import frame_of as frame_of, read_frame as read_frame, read_rows as read_rows
 from .submissions import SUBMISSION as SUBMISSION, read_submission as read_submission
 from .summary import mean_interval as mean_interval, means as means, means_over_scenes as means_over_scenes
 from .summary import ranks as ranks, sign_flip_p as sign_flip_p

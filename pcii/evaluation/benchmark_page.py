@@ -12,9 +12,8 @@ from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.evaluation_page import ABOUT_YARDSTICKS, accuracy_plot
-from pcii.evaluation.frames import frame_of
 from pcii.evaluation.method_names import estimator_of, known_methods
-from pcii.evaluation.rows import Row, read_rows
+from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.evaluation.submissions import SUBMISSION, ScoredSubmission, read_as
 from pcii.evaluation.summary import (
     LOOK_AT_NO_PHOTON,

@@ -14,10 +14,9 @@ from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.evaluation_page import write_evaluation
-from pcii.evaluation.frames import frame_of
 from pcii.evaluation.measurement import EvaluationJob, Task, measure, tasks_of
 from pcii.evaluation.method_names import named_method
-from pcii.evaluation.rows import Row, origin_of, writing_rows
+from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
 from pcii.evaluation.submissions import (
     RUN,
     SCORED,

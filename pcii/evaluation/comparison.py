@@ -11,10 +11,9 @@ from pcii.base.executor import THIS_PROCESS, Executor
 from pcii.base.progress import Report, silent
 from pcii.evaluation import summary
 from pcii.evaluation.evaluation_page import AXES, ERRORS, accuracies, write_evaluation
-from pcii.evaluation.frames import frame_of
 from pcii.evaluation.measurement import EvaluationJob, measure, tasks_of
 from pcii.evaluation.method_names import Method, named_methods
-from pcii.evaluation.rows import key_of, origin_of, writing_rows
+from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
 from pcii.figures.charts import draw_accuracy, known_places
 from pcii.figures.panels import in_style, several_axes
 from pcii.store.collection import is_collection, read_index
@@ -33,7 +32,7 @@ SEED = re.compile(r"(.*_)?seed_\d+")
 class Evaluation:
     """What was measured of methods on datasets.
 
-    `frame` has a row for each dataset, light, method and plane, or depth map; `pcii.evaluation.frames` lists
+    `frame` has a row for each dataset, light, method and plane, or depth map; `pcii.evaluation.rows` lists
     its columns. `made_again` is a sentence for each change of software for which earlier rows were measured
     again. `origin` says what measured the rows: versions, machines and days.
     """

@@ -1,13 +1,18 @@
-"""Rows of an evaluation: rows.jsonl, which grows while methods are measured.
+"""Rows of an evaluation: rows.jsonl, which grows while methods are measured, and the data frame of it.
 
-It has one JSON object for each dataset, light and method. What is measured again, since other software made
-it, is added below, and the last row counts.
+The file has one JSON object for each dataset, light and method. What is measured again, since other software
+made it, is added below, and the last row counts.
+
+The frame has a row for each dataset, light, method and plane, or depth map. Its columns, which
+docs/evaluation.md lists, are `HEAD`, `photons_per_view`, `seconds`, and what was measured: `iou` and the
+other scores against the objects of the plane, `pixel_iou` and the others against the points within 1 px of
+blur, `within_1px` and the other scores of depth, with dots for what is nested, `bound_px`.
 """
 
 import json
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -19,12 +24,15 @@ from pcii.base.safe_files import locked, named_in_errors
 from pcii.store.folders import EVALUATION_FOLDER, ROWS
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
     from pydantic import TypeAdapter
 
 Row = dict[str, Any]
 Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 """Columns of the frame of an evaluation that say of what a row is: no measure has such a name."""
+MAX_COLUMNS = 300
+"""Some three times what the measures need; a page takes 10 ms for each."""
 
 
 def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -44,7 +52,7 @@ def _measures(scores: Any) -> Any:
     return measures or scores
 
 
-def plane_parts(plane: Mapping[str, Any]) -> Row:
+def _plane_parts(plane: Mapping[str, Any]) -> Row:
     """A plane with its scores as one member."""
     scores = dict(plane)
     parts = {name: scores.pop(name) for name in ("z_mm", "object", "truth") if name in scores}
@@ -86,7 +94,7 @@ def _row_model() -> "TypeAdapter[Any]":
         machine: NotRequired[Text]
         bound_px: NotRequired[float | None]
         depth: NotRequired[Annotated[dict[str, float | None], by_names]]
-        planes: NotRequired[list[Annotated[Plane, BeforeValidator(plane_parts)]]]
+        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
 
     return TypeAdapter(RowModel)
 
@@ -174,3 +182,86 @@ def origin_of(rows: Sequence[Row]) -> dict[str, Any]:
         "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
         "days": [days[0], days[-1]] if days else [],
     }
+
+
+def read_frame(out: str | Path) -> "DataFrame":
+    """The frame of the evaluation in a folder; raises `InputError` as `read_rows` does."""
+    return frame_of(read_rows(Path(out)))
+
+
+def frame_of(rows: Sequence[Row]) -> "DataFrame":
+    """The frame of rows, scenes in their order; raises `InputError` for more than `MAX_COLUMNS` measures."""
+    import pandas as pd
+
+    labels = _labels(rows)
+    records = [
+        {
+            "scene": labels[row["title"], row["recipe"]],
+            "light": "by exposure" if row["budget"] is None else row["budget"],
+        }
+        | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
+        | {"z_mm": None, "objects": None}
+        | {name: row.get(name) for name in ("photons_per_view", "seconds")}
+        | measured
+        for row in rows
+        for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
+    ]
+    if len(set().union(*records)) > MAX_COLUMNS:
+        raise InputError(
+            f"{ROWS}: expected the same measures in all rows, not more than {MAX_COLUMNS} different ones"
+        )
+    frame = pd.DataFrame(records, columns=None if records else [*HEAD])
+    texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
+    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
+    numbers = frame.columns.difference([*texts, "light"])
+    frame[numbers] = frame[numbers].astype("float64")
+    frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
+    # Numbers of photons, then an exposure, then full light.
+    lights = sorted(set(frame["light"]), key=lambda light: (isinstance(light, str), light))
+    frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
+    return frame
+
+
+def _encodable(text: str) -> str:
+    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
+    return text.encode(errors="backslashreplace").decode()
+
+
+def _of_depth(row: Row) -> Row:
+    return dict(leaves(row["depth"])) | ({"bound_px": row["bound_px"]} if "bound_px" in row else {})
+
+
+def _of_planes(row: Row) -> Iterable[Row]:
+    """A record for each plane, with its scores against both kinds of truth."""
+    records: dict[float, Row] = {}
+    for plane in row["planes"]:
+        record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
+        scores = dict(leaves(_plane_parts(plane)["scores"]))
+        if plane["truth"] == "object":
+            record |= {"objects": plane["object"]} | scores
+        else:
+            record |= {f"pixel_{name}": scores[name] for name in scores}
+    return records.values()
+
+
+def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
+    """By title and recipe: the title, with the settings that distinguish it from others of the same title."""
+    recipes: dict[str, dict[str, dict[str, str]]] = {}
+    for row in rows:
+        settings = row.get("settings", {})
+        texts = {name: text if isinstance(text, str) else json.dumps(text) for name, text in settings.items()}
+        recipes.setdefault(row["title"], {}).setdefault(row["recipe"], texts)
+    labels: dict[tuple[str, str], str] = {}
+    for title, by_recipe in recipes.items():
+        names = dict.fromkeys(name for settings in by_recipe.values() for name in settings)
+        differing = [name for name in names if len({texts.get(name) for texts in by_recipe.values()}) > 1]
+        parts = {
+            recipe: [f"{name}={texts[name]}" for name in differing if name in texts]
+            for recipe, texts in by_recipe.items()
+        }
+        for recipe, words in parts.items():
+            if len(parts) > 1 and list(parts.values()).count(words) > 1:
+                # A scene that was changed, or has no recipe, differs in no setting.
+                words = [*words, f"recipe {recipe[:8]}"]
+            labels[title, recipe] = f"{title} ({', '.join(words)})" if words else title
+    return labels

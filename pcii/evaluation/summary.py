@@ -1,6 +1,6 @@
 """Means of an evaluation with their intervals, and comparisons of methods on the same datasets.
 
-All are of `Evaluation.frame` (see `pcii.evaluation.frames`). Datasets that differ in seed and amount of light
+All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
 alone are one scene.
 """
 

@@ -56,8 +56,8 @@ def without_hot_pixels(counts: PhotonCounts, planes: FocalPlanes) -> tuple[Photo
             UserWarning,
             stacklevel=2,
         )
-    kept = ~hot[events.i, events.j]
-    k, l, i, j, n = (getattr(events, name)[kept] for name in "klijn")
+    is_plain = ~hot[events.i, events.j]
+    k, l, i, j, n = (getattr(events, name)[is_plain] for name in "klijn")
     # The neighbour to the left is copied, in the first columns that to the right.
     source_offset = np.where(np.arange(W) >= step, -step, step)
     pieces = [(k, l, i, j, n)]

@@ -91,11 +91,11 @@ def evidence_of_texture(
     from pcii.evidence.octave_kernels import add_saturated
 
     planes = replace(planes, rounding=ROUNDING)
-    chosen = model or TextureModel()
+    texture_model = model or TextureModel()
     colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
     if isinstance(data, PhotonCounts):
         data = replace(data, cfa=None)  # colours are summed, sooner is faster
-    least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
+    least_samples = texture_model.least_coverage * data.grid.view_count * colours * block_px**2
     scale = binary_scale(data) if isinstance(data, Views) else 1.0
     h, w = (-(-size // block_px) for size in data.grid.shape_HW)
     nats, sums, samples = (np.empty((len(planes), h, w), np.float32) for _ in range(3))
@@ -110,17 +110,17 @@ def evidence_of_texture(
             block_sums(part, PHOTON_CELL_BLOCKS, np.float32) for part in (blocks[0], blocks[-1])
         )
         photons = of_cells**2 / np.maximum(spread, LEAST_RATE)
-        return _of_section(blocks, number, chosen, least_samples), photons
+        return _of_section(blocks, number, texture_model, least_samples), photons
 
     octaves, photons = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
     largest = [reduce(np.maximum, each).clip(min=0) for each in zip(*octaves, strict=True)]
 
     def sum_octaves(plane: int) -> None:
         total = np.empty((0, 0), np.float32)
-        for octave in reversed(range(chosen.octaves)):
+        for octave in reversed(range(texture_model.octaves)):
             # The first two octaves have the same grid.
             evidence, step = octaves[plane][octave], 2 if octave > 0 else 1
-            add_saturated(evidence, largest[octave], chosen.saturation_nats, total, step)
+            add_saturated(evidence, largest[octave], texture_model.saturation_nats, total, step)
             total = evidence
         nats[plane] = total[:h, :w]
 

@@ -39,7 +39,7 @@ from pcii.exchange.hci_scenes import write_hci
 from pcii.store.collection import COLUMNS, Collection, is_collection, open_collection
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folders import check_free
-from pcii.types.photon_events import FrameEvents
+from pcii.types.photon_counts import FrameEvents
 from pcii.types.photon_limit import Light
 from pcii.types.truth import OPTIONAL_MAPS, Truth
 

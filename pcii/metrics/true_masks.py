@@ -157,10 +157,10 @@ def photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> di
     rows: dict[Kind, Row] = {}
     for kind in KINDS:
         counted = ~true.is_free(kind, object_id, blur_px)
-        kept, to_keep = claimed & counted, right[kind] & counted
-        both = int(np.count_nonzero(kept & to_keep))
+        claimed_here, to_keep = claimed & counted, right[kind] & counted
+        both = int(np.count_nonzero(claimed_here & to_keep))
         rows[kind] = {
-            "photon_precision": both / int(kept.sum()) if kept.any() else None,
+            "photon_precision": both / int(claimed_here.sum()) if claimed_here.any() else None,
             "photon_recall": both / int(to_keep.sum()) if to_keep.any() else None,
         }
     return rows

@@ -8,20 +8,26 @@ Another package registers one as an entry point of the group `pcii.methods`:
 `remove` is called with the `PhotonCounts` and their `Sections` at the requested planes, and returns a
 `Segmented` of these sections. Entry points are read, and the package imported, only when a method is
 requested that is not built in.
+
+The method "posterior" is the network of depth (`pcii.depth.surface_network`), whose inputs include the
+requested planes. It gives each block the probability that the surface seen there belongs to an object in
+focus at each of them, or to none. A block belongs to the most probable one. Nothing is claimed where the
+depth map has no answer.
 """
 
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from pcii.base.blocks import on_pixels
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.methods import check_range_mm
-from pcii.removal.posterior_masks import remove_by_network
+from pcii.depth.methods import check_range_mm, check_search
+from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.estimates import DepthMap, DepthPosterior, Segmented
 from pcii.types.focal_planes import check_depth_counts
 from pcii.types.photon_counts import PhotonCounts
 from pcii.types.section_stack import Sections
@@ -40,7 +46,7 @@ def segment(
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
     `method` is one of `pcii.removal_methods()`: "posterior", by the network of depth; "three-step" (Muniraj
-    et al. 2017, Eqs. 7-9); a simple one to compare them with ("brightness", "variance", "shape-from-focus");
+    et al. 2017, Eqs. 7-9); a simple one to compare them with ("brightness", "shape-from-focus");
     or one that an installed package registers; or a function that returns a `Segmented`
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
     objects, their colours or their depths. "posterior" alone uses `z_range_mm` (near, far): what is
@@ -136,6 +142,32 @@ def _unmet_requirement(
     if kept is not None and kept.shape[1] != events:
         return f"photon_in_focus for the {events} events of the counts, not for {kept.shape[1]}"
     return None
+
+
+def remove_by_network(
+    counts: PhotonCounts, sections: Sections, z_range_mm: tuple[float, float] | None = None
+) -> Segmented:
+    """In-focus masks (Z, H, W) of the sections; there may be surfaces in the range, or else around them.
+
+    `steps` holds `probability` (Z, H, W) float32, that of belonging to the plane.
+    """
+    z_mm = sections.planes.z_mm
+    check_search(counts.grid, "z_mm", np.append(z_mm, z_range_mm or ()))
+    return masks_of(PosteriorDepth().posterior(counts, z_range_mm, z_mm), sections)
+
+
+def masks_of(posterior: DepthPosterior, sections: Sections) -> Segmented:
+    """In-focus masks of the sections, at whose planes the posterior was requested."""
+    # A plane that is requested twice counts once.
+    _, first_requests = np.unique(sections.planes.z_mm, return_index=True)
+    out_of_focus = 1 - posterior.in_focus[first_requests].sum(axis=0)
+    is_most_probable = posterior.in_focus >= np.maximum(posterior.in_focus.max(axis=0), out_of_focus)
+    masks, probability = (
+        on_pixels(blocks, posterior.block_px, posterior.planes.grid.shape_HW)
+        for blocks in (is_most_probable & posterior.is_detected, posterior.in_focus)
+    )
+    steps, hot_pixels = {"probability": probability}, posterior.hot_pixels
+    return Segmented(masks, "posterior", sections, steps, hot_pixels=hot_pixels)
 
 
 METHODS: dict[str, Method | str] = {

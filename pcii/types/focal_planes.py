@@ -20,8 +20,7 @@ from pcii.types.geometry import (
     total_disparity_px,
 )
 from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_events import PhotonEvents
+from pcii.types.photon_counts import PhotonCounts, PhotonEvents
 from pcii.types.truth import PhotonTruth
 
 

@@ -1,25 +1,100 @@
 """Photon counts of the elemental images, as sparse events or as a dense stack, and their frames."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import times
+from pcii.base.short_form import ShortForm, times
 from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
 from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_events import (
-    FrameEvents,
-    PhotonEvents,
-    checked_pixels,
-    events_of,
-    sorted_events,
-    sorted_frames,
-)
 from pcii.types.readout import PLAIN, Readout
+
+
+@dataclass(frozen=True, repr=False)
+class PhotonEvents(ShortForm):
+    """Pixels with photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,) of integers."""
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    n: np.ndarray
+
+    def _facts(self) -> dict[str, object]:
+        return {"events": self.n.size, "photons": int(self.n.sum())}
+
+
+@dataclass(frozen=True, repr=False)
+class FrameEvents:
+    """Single counts: camera (k, l), pixel (i, j) and `frame`, from 0; five arrays (N,) of integers."""
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    frame: np.ndarray
+
+
+def _checked_pixels(columns: Mapping[str, np.ndarray], grid: CameraGrid) -> tuple[np.ndarray, ...]:
+    """Lists k, l, i, j of cameras and pixels as int32; `InputError` for an index outside the grid."""
+    pixels = []
+    for (name, values), limit in zip(columns.items(), grid.shape_KLHW, strict=True):
+        column = whole_counts(name, np.atleast_1d(values))
+        if column.ndim != 1:
+            raise InputError(f"{name}: expected a one-dimensional list")
+        if column.size and column.max() >= limit:
+            raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
+        pixels.append(column.astype(np.int32))
+    return tuple(pixels)
+
+
+def _events_of(pixels: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
+    """Events of pixels (k, l, i, j) that are sorted, one event each."""
+    k, l, i, j = (read_only(index.astype(np.int32, copy=False)) for index in pixels)
+    return PhotonEvents(k, l, i, j, read_only(n))
+
+
+def _sorted_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
+    """Events sorted by (k, l, i, j), one per pixel, without zeros: equal counts have equal events."""
+    flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
+    if n.all() and (np.diff(flat) > 0).all():  # as files and parts of other counts have them
+        return _events_of(pixels, n)
+    occupied, inverse = np.unique(flat, return_inverse=True)
+    photons = np.zeros(occupied.size, dtype=np.int64)
+    np.add.at(photons, inverse, n)
+    occupied, photons = occupied[photons > 0], photons[photons > 0]
+    return _events_of(np.unravel_index(occupied, grid.shape_KLHW), photons)
+
+
+def _sorted_frames(
+    pixels: tuple[np.ndarray, ...], n: np.ndarray, frame: np.ndarray, grid: CameraGrid, readout: Readout
+) -> np.ndarray:
+    """Frame of each count of pixels that have `n`, in the order of their `_sorted_events`, (sum n,) int32.
+
+    Frames of a pixel are in their order. Raises `InputError` for a list of another length, a frame outside
+    the exposure, and more counts in one than it holds.
+    """
+    if frame.shape != (int(n.sum()),):
+        raise InputError(f"frame: expected one for each of {int(n.sum())} counts, got {frame.shape}")
+    if frame.size and frame.max() >= readout.frames:
+        raise InputError(f"frame: {frame.max()} is outside 0 .. {readout.frames - 1}")
+    flat = np.ravel_multi_index(pixels, grid.shape_KLHW).repeat(n)
+    frame = frame.astype(np.int32)
+    step = np.diff(flat)
+    if not ((step > 0) | (step == 0) & (np.diff(frame) >= 0)).all():
+        order = np.lexsort((frame, flat))
+        flat, frame = flat[order], frame[order]
+    most = readout.most_per_frame
+    if most is not None and most < frame.size:
+        again = (flat[most:] == flat[:-most]) & (frame[most:] == frame[:-most])
+        if again.any():
+            raise InputError(f"frame: a pixel has more counts in frame {frame[most:][again][0]} than {most}")
+    return read_only(frame)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,16 +173,16 @@ class PhotonCounts(Plottable):
         (3, [0, 0, 0, 0, 2, 0])
         """
         _check_sensor(grid, cfa)
-        pixels = checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
+        pixels = _checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*pixels, photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         readout = Readout(frames, bits)
-        events = sorted_events(pixels, photons, grid)
+        events = _sorted_events(pixels, photons, grid)
         whole_counts("n", events.n)  # after those of one pixel are added up
         readout.check(events.n)
         if frame is not None:
-            frame = sorted_frames(pixels, photons, whole_counts("frame", frame), grid, readout)
+            frame = _sorted_frames(pixels, photons, whole_counts("frame", frame), grid, readout)
         return cls(grid, cfa, _events=events, readout=readout, frame=frame)
 
     def _facts(self) -> dict[str, object]:
@@ -149,7 +224,7 @@ class PhotonCounts(Plottable):
             return self._events
         assert self._dense is not None
         pixels = np.nonzero(self._dense)
-        return events_of(pixels, self._dense[pixels].astype(np.int64))
+        return _events_of(pixels, self._dense[pixels].astype(np.int64))
 
     @cached_property
     def frame_events(self) -> FrameEvents | None:
@@ -245,7 +320,7 @@ class PhotonCounts(Plottable):
             n = np.bincount(event[is_sampled], minlength=events.n.size)
             frame = read_only(self.frame[is_sampled])
         lit = n > 0
-        events = events_of((events.k[lit], events.l[lit], events.i[lit], events.j[lit]), n[lit])
+        events = _events_of((events.k[lit], events.l[lit], events.i[lit], events.j[lit]), n[lit])
         return PhotonCounts(self.grid, self.cfa, _events=events, readout=self.readout, frame=frame)
 
 

@@ -115,7 +115,7 @@ def generate(
     from simgen.app.library import generate as generate_dataset
     from simgen.app.library import generate_sweep
     from simgen.renderer import backend
-    from simgen.spec.recipe import RecipeFile
+    from simgen.spec.recipe_files import RecipeFile
     from simgen.spec.sweeps import load_sweep
 
     sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes, trust_python=trust_python)

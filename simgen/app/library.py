@@ -15,7 +15,7 @@ from simgen.check.targets import load_target
 from simgen.dataset import dataset_collection as collections
 from simgen.dataset import generation
 from simgen.spec import scene_lookup
-from simgen.spec.recipe import RecipeFile
+from simgen.spec.recipe_files import RecipeFile
 from simgen.spec.scene import Scene, scene_of
 from simgen.spec.sweeps import Sweep, load_sweep
 

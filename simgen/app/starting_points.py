@@ -12,7 +12,7 @@ from string import Template
 from pcii.base.errors import InputError
 from pcii.base.safe_files import new_folder_safely, write_bytes_safely
 from simgen.base.strict_models import shorten
-from simgen.spec.recipe import recipe_file, recipe_names
+from simgen.spec.recipe_files import recipe_file, recipe_names
 from simgen.spec.scene import NAME
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
 from simgen.spec.sweeps import load_sweep

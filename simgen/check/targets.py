@@ -14,7 +14,8 @@ from simgen.check.sight import sight_findings
 from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.dataset.resources import available_bytes, shortage
 from simgen.spec.materials import is_clear
-from simgen.spec.recipe import Recipe, Render, recipe_file, recipe_names
+from simgen.spec.recipe import Recipe, Render
+from simgen.spec.recipe_files import recipe_file, recipe_names
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, scene_names
 from simgen.spec.sweeps import Sweep, load_sweep

@@ -38,7 +38,8 @@ from simgen.dataset.croissant_file import write_croissant
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions
 from simgen.renderer import backend
-from simgen.spec.recipe import Publication, Recipe, load_recipe
+from simgen.spec.recipe import Publication, Recipe
+from simgen.spec.recipe_files import load_recipe
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]

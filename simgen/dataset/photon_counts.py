@@ -15,8 +15,8 @@ from pcii.store.dataset_writer import write_photon_truth
 from pcii.types.photon_limit import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
 from simgen.photons.capture import Capture, ranks_in_scopes
+from simgen.photons.counting_plan import MAX_NOISE_SHARE
 from simgen.photons.exploration import Plan
-from simgen.photons.light_probe import MAX_NOISE_SHARE
 from simgen.sensor import detector
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor

@@ -12,7 +12,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.photons.disparity_layers import layers_for, tile_px_for
-from simgen.photons.exploration import MAX_RAYS, Plan
+from simgen.photons.exploration import Plan
+from simgen.photons.pilot import MAX_RAYS
 from simgen.spec.recipe import Recipe
 
 BASE_BYTES = 4e8

@@ -53,7 +53,7 @@ def drawn_crossing(random: Random) -> Scene:
     near, far = planes = two_planes(random)
     mean = [random.uniform(0.3, 0.7) for _ in range(3)]
     alike = [[round(part + random.uniform(-0.04, 0.04), 2) for part in mean] for _ in planes]
-    behind, across = ({"reflectance": own} for own in alike)
+    behind, across = ({"reflectance": colour} for colour in alike)
     x, y = random.uniform(-20, 20), random.uniform(-20, 20)
     radius, scale = random.uniform(50, 65), far / REFERENCE_MM
     place = x * scale, y * scale, far + 0.6 * radius * scale
@@ -102,8 +102,8 @@ def drawn_cards(random: Random) -> Scene:
         shape = draw.card(height * random.uniform(1, 2.2), height)
         x, y = (random.uniform(-120, 120) * scale for _ in range(2))
         # Most are of their layer's colour; some of any, some plain.
-        own = colours[layer] if random.random() < 0.6 else draw.colour(random, 0.3, 0.7)
-        material = draw.noise(random, own) if random.random() < 0.8 else draw.plain(random)
+        colour = colours[layer] if random.random() < 0.6 else draw.colour(random, 0.3, 0.7)
+        material = draw.noise(random, colour) if random.random() < 0.8 else draw.plain(random)
         rotation_deg = random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(0, 180)
         place = x, y, z + random.uniform(-6, 6)
         objects.add(f"card-{position}", place, rotation_deg, shape, material)

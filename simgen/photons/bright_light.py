@@ -141,8 +141,8 @@ def mirrored_light(
         if alike.bounces.any():
             clear = capture.render_scene.names.get(int(np.bincount(alike.object_id).argmax()))
             name += " through what is no object" if clear is None else f" through '{clear}'"
-        seen = BrightLight.of(name, alike.light, alike.radiance)
-        result.append(seen if is_scattered else seen._replace(arrivals=alike, bounces=bounces))
+        light = BrightLight.of(name, alike.light, alike.radiance)
+        result.append(light if is_scattered else light._replace(arrivals=alike, bounces=bounces))
     return result
 
 
@@ -181,7 +181,7 @@ def lit_light(
     capture = sampler.capture
     tracer = LampTracer(capture.render_scene, capture.rig, capture.cfa, 0.0)
     least_radiance = brightest_that_matters(film_light, paths, capture.grid.height * capture.grid.width)
-    rows, seen = list[BrightLight](), [nothing(capture.channels).exceeding]
+    rows, samples = list[BrightLight](), [nothing(capture.channels).exceeding]
     for lit in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
         view = np.arange(lit.area_mm2.size) % capture.grid.view_count
         k, l = np.divmod(view, capture.grid.cols)
@@ -201,8 +201,8 @@ def lit_light(
         if bright.any():
             light = (image_px[here] * radiance)[bright]
             rows.append(BrightLight.of("a place that a lamp lights", light, radiance[bright]))
-            seen.append(traced.take(bright))
-    return rows, Samples.joined(seen)
+            samples.append(traced.take(bright))
+    return rows, Samples.joined(samples)
 
 
 def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:

@@ -42,12 +42,13 @@ class ScalarSampler(CandidateSampler):
         bound = self.majorant.bound[place]
         floor = 0.0 if self.below is None else self.below.bound[place]
         ratio = radiance / bound
-        kept = np.flatnonzero(chance[candidate] * bound < np.minimum(radiance, bound) - floor)
+        accepted = np.flatnonzero(chance[candidate] * bound < np.minimum(radiance, bound) - floor)
         exceeding = np.flatnonzero(ratio > 1)
-        photon, origin = _take(candidates, kept), {"object_id": object_id[kept], "z_mm": z_mm[kept]}
+        photon = _take(candidates, accepted)
+        origin = {"object_id": object_id[accepted], "z_mm": z_mm[accepted]}
         return Accepted(
             PhotonTable(*photon[:4], np.ones_like(photon.k), **origin),
-            candidate[kept],
+            candidate[accepted],
             ratio,
             self._samples(_take(candidates, exceeding), z_mm[exceeding], light[exceeding]),
         )

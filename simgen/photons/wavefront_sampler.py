@@ -101,9 +101,9 @@ class WavefrontSampler(CandidateSampler):
         is_kept = dr.gather(mi.Float, chance, rest) * (most - floor) < radiance - floor
         ratio = radiance / most
         dr.eval(is_kept, ratio)
-        kept, over = dr.compress(is_kept), dr.compress(ratio > 1)
-        photon, hit = _take(candidates, kept), _take_hits(first, kept)
-        candidate = dr.gather(mi.UInt32, rest, kept)
+        accepted, over = dr.compress(is_kept), dr.compress(ratio > 1)
+        photon, hit = _take(candidates, accepted), _take_hits(first, accepted)
+        candidate = dr.gather(mi.UInt32, rest, accepted)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
         self._require_finite(ratio, candidates, first)
         exceeding = nothing(capture.channels).exceeding
@@ -112,7 +112,7 @@ class WavefrontSampler(CandidateSampler):
         k, l, i, j = (np.array(part) for part in photon[:4])
         object_id = capture.render_scene.object_of_shape[np.array(hit.shape)]
         origin = {"object_id": object_id, "z_mm": np.array(hit.z_mm)}
-        photons = PhotonTable(k, l, i, j, np.ones(len(kept), np.int64), **origin)
+        photons = PhotonTable(k, l, i, j, np.ones(len(accepted), np.int64), **origin)
         return Accepted(photons, np.array(candidate), np.array(ratio), exceeding)
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:

@@ -268,23 +268,23 @@ class LampTracer:
         context = mi.BSDFContext(mi.TransportMode.Importance)
         ids = objects_by_shape(self.render_scene) if is_scalar(mi) else {}
 
-        def end(given: Any, wavelengths: Any) -> tuple[Any, ...]:
+        def end(columns: Any, wavelengths: Any) -> tuple[Any, ...]:
             ray = mi.RayDifferential3f(
-                mi.Ray3f(mi.Point3f(*given[:3]), mi.Vector3f(*given[3:6]), 0.0, wavelengths)
+                mi.Ray3f(mi.Point3f(*columns[:3]), mi.Vector3f(*columns[3:6]), 0.0, wavelengths)
             )
             hit = scene.ray_intersect(ray)
             is_hit = hit.is_valid()
             if is_scalar(mi) and not is_hit:
                 return np.inf, 0, False, mi.Spectrum(0), ray.o, ray.d
-            pair = mi.Point2f(given[7], given[8])
-            sample, weight = hit.bsdf(ray).sample(context, hit, given[6], pair, is_hit)
+            pair = mi.Point2f(columns[7], columns[8])
+            sample, weight = hit.bsdf(ray).sample(context, hit, columns[6], pair, is_hit)
             onwards = hit.spawn_ray(hit.to_world(sample.wo))
             is_perfect = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
             shape = ids[(hit.instance or hit.shape).id()] if ids else shape_number(self.render_scene, hit)
             return hit.t, shape, is_perfect, weight, onwards.o, onwards.d
 
-        given = np.concatenate([rays.origin, rays.direction, numbers], axis=1)
-        values = self._each(end, given, rays.wavelength_nm)
+        columns = np.concatenate([rays.origin, rays.direction, numbers], axis=1)
+        values = self._each(end, columns, rays.wavelength_nm)
         object_id = values[:, 1].astype(np.int64)
         if not is_scalar(mi):
             object_id = self.render_scene.object_of_shape[object_id].astype(np.int64)

@@ -168,7 +168,7 @@ def mirrored_radiance(
     mi, dr, scene, context = render_scene.mi, load_drjit(), render_scene.scene, render_scene.mi.BSDFContext()
 
     def lengthen(
-        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, found: Any, sampler: Any
+        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, last_bright: Any, sampler: Any
     ) -> tuple[Any, ...]:
         choice, pair = sampler.next_1d(active), sampler.next_2d(active)
         sample, of_segment = hit.bsdf(ray).sample(context, hit, choice, pair, active)
@@ -178,8 +178,8 @@ def mirrored_radiance(
         shines = dr.select(active, hit.emitter(scene, active).eval(hit, active), 0)
         is_bright = dr.max(shines) > above
         radiance += dr.select(is_bright, weight * shines, 0)
-        found = dr.select(is_bright, longest - left, found)
-        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, found, sampler
+        last_bright = dr.select(is_bright, longest - left, last_bright)
+        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, last_bright, sampler
 
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
     longest = dr.opaque(mi.UInt32, render_scene.max_depth)

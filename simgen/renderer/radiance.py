@@ -113,8 +113,8 @@ def _mean_of_paths(
             film = {"sensor": sensor, "spp": part, "seed": int(rng.integers(1 << 32))}
             image = np.array(mi.render(render_scene.scene, **film))
             if hidden is not None:  # of the same rays, so that what is left has no noise of it
-                seen = np.array(mi.render(render_scene.scene, integrator=hidden, **film))
-                image = np.maximum(image - seen, 0)
+                surroundings = np.array(mi.render(render_scene.scene, integrator=hidden, **film))
+                image = np.maximum(image - surroundings, 0)
             if part == samples:
                 return image
             total = total + part * image.astype(np.float64)

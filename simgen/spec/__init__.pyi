@@ -13,9 +13,10 @@ from .mitsuba_file import MitsubaFile as MitsubaFile, MitsubaXml as MitsubaXml, 
 from .recipe import Analysis as Analysis, CalibrationErrors as CalibrationErrors, Exposure as Exposure
 from .recipe import FullLight as FullLight, Grid as Grid, Lens as Lens, MOST_PATHS as MOST_PATHS
 from .recipe import MOST_PHOTONS as MOST_PHOTONS, Photons as Photons, Products as Products
-from .recipe import Publication as Publication, Recipe as Recipe, RecipeFile as RecipeFile, Render as Render
-from .recipe import Sensor as Sensor, ViewPass as ViewPass, load_recipe as load_recipe, override as override
-from .recipe import recipe_file as recipe_file, recipe_names as recipe_names
+from .recipe import Publication as Publication, Recipe as Recipe, Render as Render, Sensor as Sensor
+from .recipe import ViewPass as ViewPass
+from .recipe_files import RecipeFile as RecipeFile, load_recipe as load_recipe, override as override
+from .recipe_files import recipe_file as recipe_file, recipe_names as recipe_names
 from .scene import Backdrop as Backdrop, MOST_OBJECTS as MOST_OBJECTS, NAME as NAME, Scene as Scene
 from .scene import SceneObject as SceneObject, check_unscored as check_unscored
 from .scene import checked_folder as checked_folder, names_of_objects as names_of_objects

@@ -1,18 +1,12 @@
 """Recipes: one TOML file a dataset, resolved and validated before anything is rendered."""
 
-import tomllib
-from collections.abc import Sequence
-from copy import deepcopy
-from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from pcii.base.errors import InputError
 from pcii.store.dataset_card import Terms
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.readout import MOST_BITS, MOST_FRAMES, Readout
-from simgen.base.file_lookup import find, find_all
 from simgen.base.strict_models import (
     LARGEST_MM,
     Count,
@@ -25,10 +19,6 @@ from simgen.base.strict_models import (
     Title,
     Whole,
     completed_by,
-    read_toml,
-    shown_value,
-    suggestion,
-    validate,
 )
 from simgen.spectral.filters import camera_names
 
@@ -46,8 +36,6 @@ SEED_LIMIT = 1 << 63
 """Seeds are less."""
 APERTURE_TOLERANCE = 0.01
 """F-numbers are rounded by about so much."""
-OF_ITS_SCENE = ("title", "analysis")
-"""Fields of a recipe that are about its own scene alone."""
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
 ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
 ViewPasses = Annotated[
@@ -347,89 +335,3 @@ class Recipe(Strict):
     def cfa(self) -> str | None:
         """Bayer pattern, None for a monochrome sensor."""
         return self.sensor.bayer
-
-
-def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
-    """Put values written as `key=value` into what a recipe says; raises `InputError` for any other text.
-
-    A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string.
-    """
-    for text in overrides:
-        key, equals, value = text.partition("=")
-        if not equals or not all(key.split(".")):
-            raise InputError(f"--set: expected key=value such as photons.budget=300, got {text!r}")
-        *tables, last = key.split(".")
-        target = values
-        for table in tables:
-            target = target.setdefault(table, {})
-            if not isinstance(target, dict):
-                raise InputError(f"--set: {table!r} in {key!r} is a value, not a table")
-        try:
-            target[last] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            if value.startswith(("[", "{")):
-                raise InputError(f"--set: {text!r}: words in a list need quotation marks") from None
-            target[last] = value
-
-
-class RecipeFile(NamedTuple):
-    """A recipe as its TOML file and overrides say, and the folder beside which its scene is looked up."""
-
-    recipe: Recipe
-    folder: Path
-
-
-def load_recipe(
-    name_or_path: str | Path, overrides: Sequence[str] = (), *, trust_python: bool = False
-) -> RecipeFile:
-    """A recipe by the name of one that ships or by path; `overrides` such as "photons.budget=300".
-
-    With another scene the recipe's title and analysis are dropped but for what the overrides say. A file that
-    names a Python function as its scene is read only if its author is trusted, `trust_python`. Raises
-    `pcii.InputError` for a recipe that is missing or wrong, with the field at fault.
-
-    >>> load_recipe("paper", ["photons.budget=300"]).recipe.photons.budget
-    300.0
-    """
-    values, source, folder = read_recipe(str(name_or_path), overrides, trust_python=trust_python)
-    return RecipeFile(validate(Recipe, values, source), folder)
-
-
-def read_recipe(
-    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
-) -> tuple[dict[str, Any], str, Path]:
-    """What a recipe and its overrides say, before it is checked; what to call both; and the folder.
-
-    Overrides may name a Python function whatever is trusted: they are the person's own.
-    """
-    path = recipe_file(name_or_path)
-    if path is None:
-        hint = suggestion(Path(name_or_path).stem, recipe_names())
-        raise InputError(f"recipe: there is no {name_or_path!r}{hint}")
-    written = read_toml(path)
-    if not trust_python and ":" in str(written.get("scene", "")):
-        raise InputError(
-            f"{path}: scene: {shown_value(written['scene'])} runs Python code of the recipe's author; "
-            "if you trust it, add --trust-python (in Python trust_python=True)"
-        )
-    values = deepcopy(written)
-    override(values, overrides)
-    if values.get("scene") != written.get("scene"):
-        values = {name: value for name, value in written.items() if name not in OF_ITS_SCENE}
-        override(values, overrides)
-    source = str(path) if not overrides else f"{path} with --set {' '.join(overrides)}"
-    return values, source, path.parent
-
-
-def recipe_file(name_or_path: str) -> Path | None:
-    """The file of a recipe by path or shipped name, None if there is none."""
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
-    shipped = find(f"data_recipes/{name_or_path.removesuffix('.toml')}.toml")
-    return shipped if path.parent == Path() else None
-
-
-def recipe_names() -> list[str]:
-    """Names of the recipes that ship or stand in the working directory."""
-    return sorted({file.stem for file in find_all("data_recipes/*.toml")})

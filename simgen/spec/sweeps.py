@@ -21,7 +21,8 @@ from pydantic import BaseModel
 from pcii.base.errors import InputError
 from pcii.store.folders import hash_json
 from simgen.base.strict_models import validate
-from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
+from simgen.spec.recipe import Recipe
+from simgen.spec.recipe_files import override, read_recipe, recipe_file
 from simgen.spec.scene_lookup import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000

@@ -75,8 +75,8 @@ class Filters:
         low = self.wavelength_nm[colour[:, None], cell].astype(np.float64)
         width = self.wavelength_nm[colour[:, None], cell + 1] - low
         drawn_nm = low + width * (place - cell)
-        seen = np.array([np.interp(drawn_nm, WAVELENGTH_NM, curve) for curve in self.sensitivity])
-        return drawn_nm, seen[colour, np.arange(len(colour))] * width * (CELLS / HEROES)
+        sensitivity = np.array([np.interp(drawn_nm, WAVELENGTH_NM, curve) for curve in self.sensitivity])
+        return drawn_nm, sensitivity[colour, np.arange(len(colour))] * width * (CELLS / HEROES)
 
 
 def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:

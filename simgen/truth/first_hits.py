@@ -116,14 +116,14 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
     number = np.argsort(depth, axis=1)[:, 1]  # the second nearest
     is_nearer = depth < nearer[row, col, None]
     some = np.flatnonzero(is_nearer.sum(axis=1) >= 3)
-    row, col, chosen = row[some], col[some], 4 * some + number[some]
-    point, normal = points[chosen], normals[chosen]
+    row, col, second_nearest = row[some], col[some], 4 * some + number[some]
+    point, normal = points[second_nearest], normals[second_nearest]
     away = point - camera.position_mm
     normal *= -np.sign((normal * away).sum(axis=1))[:, None]
     ray = camera.towards(row, col)  # on to the plane of the surface that is hit close by
     share = (normal * away).sum(axis=1) / (normal * ray).sum(axis=1)
     hits.z_mm[row, col] = camera.position_mm[2] + share * ray[:, 2]
-    hits.object_id[row, col], hits.normal[row, col] = ids[chosen], normal
+    hits.object_id[row, col], hits.normal[row, col] = ids[second_nearest], normal
 
 
 def over_squares(pick: np.ufunc, values: np.ndarray, side: int) -> np.ndarray:
@@ -186,11 +186,11 @@ def visible_views(
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
         camera = rig.pinhole(k, l)
         # It faces a point if normal . (camera - point) > 0.
-        seen = camera.on_film(point) & (normal @ camera.position_mm > facing)
-        tested = np.flatnonzero(seen & may_be_blocked)
+        is_visible = camera.on_film(point) & (normal @ camera.position_mm > facing)
+        tested = np.flatnonzero(is_visible & may_be_blocked)
         if tested.size:
-            seen[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
-        count += seen
+            is_visible[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
+        count += is_visible
         traced += tested.size
         report("visibility", done, grid.view_count)
     result = np.zeros((H, W), dtype=np.uint16)

@@ -105,18 +105,18 @@ class ThreeStep:
             ridges, regions = None, _tiles(bright_at_any, 2 * margin)
         steps |= {"edges": edges[:count], "bright": bright, "regions": _repeated(regions, count)}
 
-        kept = np.ones_like(bright)
+        in_focus = np.ones_like(bright)
         if self.threshold:
-            kept &= steps["kept"]
+            in_focus &= steps["kept"]
         if self.entropy:
             entropies = edge_entropies(smooth, regions, margin)
             winner = planes_of_least_entropy(entropies, regions, ridges, window_px)[regions]
-            kept &= winner == np.arange(count)[:, None, None]
+            in_focus &= winner == np.arange(count)[:, None, None]
             steps |= {"entropy": entropies.T[:count][:, regions], "winner": _repeated(winner, count)}
         if self.subpixel > 1:
             M = self.subpixel
-            steps["fine"] = fine & kept.repeat(M, axis=1).repeat(M, axis=2)
-        return Segmented(bright & kept, self.name, requested, steps)
+            steps["fine"] = fine & in_focus.repeat(M, axis=1).repeat(M, axis=2)
+        return Segmented(bright & in_focus, self.name, requested, steps)
 
     def _bright(
         self,

@@ -120,12 +120,12 @@ def _borders(pieces: np.ndarray, edges: np.ndarray) -> Iterator[tuple[int, int, 
     """Both pieces, the summed height and the number of pixel pairs of each border; 0 has no borders."""
     size = int(pieces.max()) + 1
     keys, heights = [], []
-    for this, beside in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        first, second = pieces[this], pieces[beside]
+    for pixel, neighbour in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        first, second = pieces[pixel], pieces[neighbour]
         is_border = (first != second) & (first > 0) & (second > 0)
         first, second = first[is_border].astype(np.int64), second[is_border]
         keys.append(np.minimum(first, second) * size + np.maximum(first, second))
-        heights.append((edges[this][is_border] + edges[beside][is_border]) / 2)
+        heights.append((edges[pixel][is_border] + edges[neighbour][is_border]) / 2)
     pairs, pair_of, lengths = np.unique(np.concatenate(keys), return_inverse=True, return_counts=True)
     sums = np.bincount(pair_of, np.concatenate(heights), minlength=pairs.size)
     a, b = pairs // size, pairs % size
