@@ -4,5 +4,5 @@ import pytest
 @pytest.fixture(autouse=True)
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each plot of a page takes half a second: those of what a module makes once are drawn."""
-    for name in ("accuracy_plot", "calibration_plot"):
-        monkeypatch.setattr(f"pcii.evaluation.pages.{name}", lambda *_: "data:image/png;base64,")
+    target = "pcii.evaluation.evaluation_page.figure_uri"
+    monkeypatch.setattr(target, lambda *_: "data:image/png;base64,")

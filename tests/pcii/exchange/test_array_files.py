@@ -91,11 +91,14 @@ def test_other_files_are_named(tmp_path: Path, capsys: Any, name: str, content: 
 
 
 def write_depth(path: Path, z_mm: np.ndarray) -> None:
-    """In mm, of a .exr file as renderers write them: in metres, as one channel of several."""
+    """In mm, of a .exr file as renderers write them: in metres, as one channel of several.
+
+    0 is unknown, which some write as the largest number or as NaN.
+    """
     if path.suffix == ".png":
-        Image.fromarray(z_mm.astype(np.uint16)).save(path)
+        Image.fromarray(np.where(z_mm == 0, 65535, z_mm).astype(np.uint16)).save(path)
     elif path.suffix == ".npy":
-        np.save(path, z_mm)
+        np.save(path, np.where(z_mm == 0, np.nan, z_mm))
     else:
         layer = "ViewLayer.Depth.Z"
         channels = {layer: (z_mm / 1000).astype(np.float32), "ViewLayer.Combined.R": np.zeros_like(z_mm)}
