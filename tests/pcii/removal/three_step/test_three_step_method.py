@@ -16,7 +16,6 @@ from twins import (
 import pcii
 from pcii.base import InputError
 from pcii.removal.three_step import ThreeStep, cheapest_planes, pieces_along_ridges
-from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.variance_threshold import adaptive_threshold
 from pcii.types import FocalPlanes, PhotonCounts
 
@@ -177,18 +176,6 @@ def test_planes_are_the_cheapest_of_all_cuts_of_the_tree():
                 expected[list(part)] = cost[list(part)].sum(axis=0).argmin()
             found = cheapest_planes(pieces, edges, cost, border_cost)
             np.testing.assert_array_equal(found[1:], expected[1:])
-
-
-def test_the_entropy_of_edges_counts_how_many_pixels_share_them():
-    edges = np.zeros((3, 9, 9))
-    edges[0, 4, 4] = 7.0  # all in one pixel: 0 bits
-    edges[1, 4, 3:5] = 2.0  # two equal: 1 bit
-    regions = np.zeros((9, 9), dtype=np.int32)
-    regions[3:6, 3:6] = 1
-    entropies = edge_entropies(edges, regions, 1)
-    # The third plane has none: as disordered as can be, over the 5 x 5 pixels of the grown region.
-    np.testing.assert_allclose(entropies, [[0, 0, 0], [0, 1, np.log2(25)]], atol=1e-12)
-    np.testing.assert_array_equal(planes_of_least_entropy(entropies, regions, None, 3), [-1, 0])
 
 
 def touching(photons: float):
