@@ -139,10 +139,11 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         masks, "by hand", pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
     )
     by_object, by_pixel = (
-        [row["iou"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
+        [row["precision"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
         for kind in ("object", "pixel")
     )
     assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
+    assert truth.mask_kind == "pixel"  # what reports show
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))
     errors = depth_errors(grid, answer, truth)
