@@ -22,9 +22,10 @@ def edge_entropies(edges: np.ndarray, regions: np.ndarray, margin_px: int) -> np
     dilated by a square of half-width `margin_px`, so that it has the blurred object at all planes, too. A
     region without edges at a plane has the largest possible entropy, log2 of its number of pixels.
 
-    >>> edges = np.array([[[1.0, 0.0], [0.0, 0.0]], [[1.0, 1.0], [1.0, 1.0]]])  # one sharp, one blurred edge
+    >>> sharp, blurred, none = [[1.0, 0.0], [0.0, 0.0]], [[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 0.0]]
+    >>> edges = np.array([sharp, blurred, none])
     >>> edge_entropies(edges, np.ones((2, 2), dtype=int), margin_px=0)[1].tolist()
-    [0.0, 2.0]
+    [0.0, 2.0, 2.0]
     """
     from scipy.ndimage import find_objects, maximum_filter
     from scipy.special import xlogy

@@ -12,9 +12,10 @@ from pcii.depth import (
     estimate_depth,
     run_network,
 )
+from pcii.evidence import without_hot_pixels
 from pcii.removal import segment
 from pcii.store import sample
-from pcii.types import CameraGrid, DepthMap, PhotonCounts
+from pcii.types import CameraGrid, DepthMap, FocalPlanes, PhotonCounts
 
 RANGE_MM = (1 / 9, 1 / 1)
 
@@ -102,6 +103,18 @@ def test_the_depth_of_a_slanted_card_is_monotone(turned):
     # Bands of 16 px span 1.8 px of total disparity, planes 1: half of each.
     np.testing.assert_allclose(found, true, atol=1.4)
     assert np.isfinite(z[:, 16:-16]).mean() > 0.9
+
+
+def test_hot_pixels_are_replaced_before_depth_is_looked_for() -> None:
+    film = slanted_card(unit_grid(7, 7, 64, 64), near=6.0, far=3.0, seed=0).dense.copy()
+    film[:, :, 20:50:10, 20:50:10] += 100
+    hot = PhotonCounts.from_dense(film, unit_grid(7, 7, 64, 64), cfa="GRBG")
+    z_range_mm = (1 / 8, 1 / 2)
+    cleaned, replaced = without_hot_pixels(hot, FocalPlanes.at_depths(hot.grid, z_range_mm))
+    found, expected = (estimate_depth(counts, z_range_mm) for counts in (hot, cleaned))
+    assert found.hot_pixels == replaced == 9
+    np.testing.assert_array_equal(found.z_mm, expected.z_mm)
+    np.testing.assert_array_equal(found.confidence, expected.confidence)
 
 
 def test_what_is_beyond_the_ends_of_the_range_has_no_answer_and_belongs_to_no_mask() -> None:

@@ -5,8 +5,8 @@ from twins import unit_grid
 
 from pcii.depth import SheetModel
 from pcii.depth.explained_views import ExplainedViews
-from pcii.depth.sheets import Sheets
-from pcii.types import PhotonCounts
+from pcii.depth.sheets import Sheets, cut_sheets
+from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
 SIDE, CAMERAS, MARGIN = 48, 5, 16
 NEAR_STEP, FAR_STEP = 5, 2
@@ -73,3 +73,27 @@ def test_sweeps_find_the_bars_and_never_lower_the_objective(photons_per_px: floa
     sure = uniform_filter(shown.astype(float), 5)
     is_sure = (sure < 0.01) | (sure > 0.99)
     assert (found == shown)[is_sure].mean() > least
+
+
+def test_sheets_are_the_connected_parts_of_smooth_depth_from_near_to_far() -> None:
+    planes_px, rows = np.arange(5.0, 25.0), np.arange(SIDE)
+    slope_px = 8 + rows / 12  # to 12 px, one block after the other by less than a plane
+    depth_px = np.where(rows[:, None] < 8 + rows[:, None] // 2, slope_px[:, None], 20.0) * np.ones(SIDE)
+    depth_px[30:, 30:] = 20.0
+    probability = np.maximum(1 - np.abs(depth_px - planes_px[:, None, None]), 0).astype(np.float32)
+    planes = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
+    in_focus, nowhere = np.full((2, SIDE, SIDE), 0.45, np.float32), np.zeros((SIDE, SIDE), bool)
+    nothing = np.asarray(1 - probability.sum(axis=0), np.float32)
+    posterior = DepthPosterior(planes, probability, nothing, 1, in_focus, nowhere, ~nowhere)
+    sheets = cut_sheets(posterior, depth_px, np.array([20.5, 15.0]), SheetModel())
+    middle_px = np.median(sheets.total_px, axis=(1, 2))
+    assert len(middle_px) == 3
+    assert sheets.is_at.sum(axis=1).tolist() == [1, 1]
+    assert middle_px[sheets.is_at[1]] == pytest.approx([15.0])
+    seen = sheets.probability.argmax(axis=0)
+    np.testing.assert_array_equal(middle_px[seen] > 15, depth_px == 20.0)
+    # Of two sheets that are surely there the nearer one is seen, which has more disparity.
+    is_seen = sheets.visible(np.ones_like(sheets.total_px)) == 1
+    np.testing.assert_array_equal(
+        sheets.total_px[is_seen.argmax(axis=0), *np.indices(seen.shape)], sheets.total_px.max(axis=0)
+    )

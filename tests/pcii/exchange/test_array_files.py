@@ -91,11 +91,14 @@ def test_other_files_are_named(tmp_path: Path, capsys: Any, name: str, content: 
 
 
 def write_depth(path: Path, z_mm: np.ndarray) -> None:
-    """In mm, of a .exr file as renderers write them: in metres, as one channel of several."""
+    """In mm, of a .exr file as renderers write them: in metres, as one channel of several.
+
+    0 is unknown, which some write as the largest number or as NaN.
+    """
     if path.suffix == ".png":
-        Image.fromarray(z_mm.astype(np.uint16)).save(path)
+        Image.fromarray(np.where(z_mm == 0, 65535, z_mm).astype(np.uint16)).save(path)
     elif path.suffix == ".npy":
-        np.save(path, z_mm)
+        np.save(path, np.where(z_mm == 0, np.nan, z_mm))
     else:
         layer = "ViewLayer.Depth.Z"
         channels = {layer: (z_mm / 1000).astype(np.float32), "ViewLayer.Combined.R": np.zeros_like(z_mm)}
@@ -136,10 +139,11 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         masks, "by hand", pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
     )
     by_object, by_pixel = (
-        [row["iou"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
+        [row["precision"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
         for kind in ("object", "pixel")
     )
     assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
+    assert truth.mask_kind == "pixel"  # what reports show
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))
     errors = depth_errors(grid, answer, truth)

@@ -111,6 +111,18 @@ def test_what_hits_nothing_has_no_depth(tmp_path: Path) -> None:
     assert np.count_nonzero(posed.depth_m(0)) == 40 * 48
 
 
+def test_photons_are_proportional_to_the_numbers(tmp_path: Path) -> None:
+    grid = grid_of(1, 2, height=2, width=3)
+    dense = np.arange(12).reshape(grid.shape_KLHW) * 100
+    counts = pcii.PhotonCounts.from_dense(dense, grid, cfa="GRBG")
+    posed = exported(pcii.save_dataset(tmp_path / "data", counts).path)
+    told = {name: posed.top[name] for name in ("quantity", "unit", "white", "cfa")}
+    assert told == {"quantity": "photons", "unit": "photons", "white": 1100, "cfa": "GRBG"}
+    for l in range(2):
+        photons = posed.picture(l) / 255 * 1100
+        np.testing.assert_allclose(photons, np.repeat(dense[0, l, ..., None], 3, axis=2), atol=1100 / 510)
+
+
 def test_poses_are_those_of_the_true_cameras_and_depth_is_along_their_axes(tmp_path: Path) -> None:
     """A wall at Z = 600 mm: camera 1 is 5 mm ahead of its place and looks 30 degrees to the right."""
     grid = grid_of(1, 2)

@@ -180,12 +180,19 @@ def array(values: Any, name: str = "in.npy") -> Make:
     return make
 
 
+def channels(root: Path) -> None:
+    frames = np.zeros((4, 2, H, W), np.uint8)
+    tifffile.imwrite(root / "0_0.tif", frames, imagej=True, metadata={"axes": "TCYX"})
+
+
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
     ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "1 of 5 x 5 views missing, first row 1, col 1"),
     ("alpha", folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")), NAMED, "0_0.png: has an alpha channel"),
     ("turned JPEG", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
+    ("channels as pages", folder(channels, ending="tif"), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
     ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
     ("options of other sources", folder(), [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames: not for .*, which is read as pictures"),

@@ -11,6 +11,7 @@ from pcii.sections import (
     entropy_bits,
     pooled_estimate,
     reconstruct,
+    region_entropy_bits,
     truncated_poisson_variance,
     view_samples,
 )
@@ -39,6 +40,13 @@ def test_entropy_by_hand():
     assert entropy_bits(np.array([8.0, 255.5 / 256 * 8]), top=8.0) == 0.0  # the top is level 255
 
 
+def test_region_entropy_is_the_mean_of_its_colours_inside_the_region():
+    pooled = np.zeros((1, 4, 2))
+    pooled[0, :, 0] = [0.1, 0.9, 0.5, 0.7]
+    region = np.array([[True, True, False, False]])
+    assert region_entropy_bits(pooled, region, np.array([1.0, 1.0])) == (1.0 + 0.0) / 2
+
+
 # Pooling
 
 
@@ -56,6 +64,17 @@ def test_a_pooled_voxel_is_photons_over_samples_of_its_window(window, cfa):
         expected = sections.counts[here].sum() / samples if samples else 0.0
         # Running sums of a few dozen terms below 100: 1e-13 relative, and 1e-10 leaves room.
         assert pooled[z, i, j, c] == pytest.approx(expected, rel=1e-10, abs=0)
+
+
+def test_pooling_leaves_the_dark_exactly_dark():
+    grid = unit_grid(2, 2, 20, 20)
+    dense = np.zeros(grid.shape_KLHW, dtype=int)
+    # Running sums carry a residue of bright and unequal numbers into the dark beside them.
+    dense[..., :6, :6] = np.random.default_rng(0).integers(1, 10**9, size=(2, 2, 6, 6))
+    pooled = pooled_estimate(reconstruct(PhotonCounts.from_dense(dense, grid), 1.0), 3)
+    assert not pooled[0, 8:, :].any()
+    assert not pooled[0, :, 8:].any()
+    assert pooled[0, :5, :5].all()
 
 
 # Samples of the views, Eq. 7

@@ -413,6 +413,7 @@ def test_what_the_file_says_and_the_scene_does_not_have_is_named(tmp_path: Path)
     draft.json["meshes"][without]["primitives"][1] |= {"targets": [{}], "extensions": {"EXT_of_mesh": {}}}
     draft.node(mesh=without, name="without", extensions={"EXT_of_node": {"much": [1, 2]}}, extras={"a": 1})
     draft.node(mesh=without, name="nothing", scale=[0, 0, 0])
+    draft.put("scenes", {"nodes": [draft.node(root=False, mesh=without, name="of another scene")]})
     draft.node(camera=draft.put("cameras", {"type": "orthographic", "orthographic": {}}))
     draft.light({"type": "spot", "range": 3.0, "color": [-1, 0, 1], "spot": {"outerConeAngle": 3.0}})
     draft.json |= {"animations": [{}], "extensionsUsed": ["EXT_of_file", "KHR_materials_ior"]}
@@ -432,6 +433,7 @@ def test_what_the_file_says_and_the_scene_does_not_have_is_named(tmp_path: Path)
         "pictures that are repeated along one side alone: they are along both (material 'm')",
         "pictures on meshes without texture coordinates for them (material 'm')",
         "ior of 9, taken as 3.0",
+        "1 more scenes of the file",
         "'nothing', which is scaled to nothing, or moved or scaled beyond numbers that can be rendered",
     }
 

@@ -19,10 +19,13 @@ AT_600: dict[str, Any] = {"place_at_mm": (0, 0, 600)}
 
 
 def write_obj(path: Path) -> None:
-    """Two boxes side by side: the second counts its corners from the end, and has two materials."""
+    """Two boxes side by side: the second counts its corners from the end, and has two materials.
+
+    What a scene does not have are colours of vertices, and of materials a picture, glow and gloss.
+    """
 
     def corners(shift: float) -> str:
-        return "".join(f"v {x + shift} {y} {z}\n" for x, y, z in CORNERS)
+        return "".join(f"v {x + shift} {y} {z} 1 0 0\n" for x, y, z in CORNERS)
 
     def faces(quads: list[tuple[int, ...]], shift: int) -> str:
         return "".join("f " + " ".join(str(i + shift) for i in quad) + "\n" for quad in quads)
@@ -31,7 +34,8 @@ def write_obj(path: Path) -> None:
     text += f"o right\n{corners(2)}{faces(QUADS[:3], -8)}usemtl shiny blue\n{faces(QUADS[3:], -8)}"
     path.write_text(text)
     path.with_name("some.mtl").write_text(
-        "newmtl red\nKd 0.8 0.1 0.1\nmap_Kd wood.png\nnewmtl shiny blue\nKd 0 0 1.2\nd 1.0\n"
+        "newmtl red\nKd 0.8 0.1 0.1\nKs 0 0 0\nmap_Kd wood.png\nKe 0 0.5 0\n"
+        "newmtl shiny blue\nKd 0 0 1.2\nKs 0.5 0.5 0.5\nd 1.0\n"
     )
 
 
@@ -78,10 +82,25 @@ def test_groups_of_an_obj_file_are_objects(tmp_path: Path) -> None:
     }
     colours = [thing.material.reflectance for thing in scene.objects]
     assert colours == [(0.8, 0.1, 0.1), (0.8, 0.1, 0.1), (0, 0, 1)]
-    assert "pictures of materials (map_Kd)" in said.left_out
+    assert set(said.left_out) == {
+        "colours of vertices",
+        "pictures of materials (map_Kd)",
+        "Ke of materials",
+        "gloss of materials (Ks, Ns, Pr, Pm): all are matt",
+        "the file has no light: the scene is lit evenly from all around",
+    }
     assert scene.light_around is not None
     assert not scene.light_around.visible
     assert said.size_mm == pytest.approx((60, 40, 60))
+
+
+def test_colours_of_vertices_of_a_ply_file_are_named(tmp_path: Path) -> None:
+    properties = "".join(f"property float {name}\n" for name in "xyz") + "property uchar red\n"
+    head = f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
+    head += "property list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_text(f"{head}0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n")
+    said = import_scene(tmp_path / "a.ply", tmp_path / "out", unit="cm", **AT_600)
+    assert said.left_out[0] == "colours of vertices"
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
