@@ -4,7 +4,7 @@ from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
 from pcii.depth import SheetModel
-from pcii.depth.explained_views import ExplainedViews
+from pcii.depth.explained_views import ExplainedViews, Explanation, posterior_after
 from pcii.depth.sheets import Sheets, cut_sheets
 from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
@@ -75,16 +75,48 @@ def test_sweeps_find_the_bars_and_never_lower_the_objective(photons_per_px: floa
     assert (found == shown)[is_sure].mean() > least
 
 
+def posterior_of(
+    planes: np.ndarray, planes_px: np.ndarray, requested: int, supported: bool
+) -> DepthPosterior:
+    """A posterior of planes (Z, h, w) of known surfaces, the same for each requested plane."""
+    of_grid = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
+    nowhere, is_supported = np.zeros((SIDE, SIDE), bool), np.full((SIDE, SIDE), supported)
+    in_focus = np.full((requested, SIDE, SIDE), 0.9 / max(requested, 1), np.float32)
+    nothing = np.asarray(1 - planes.sum(axis=0), np.float32)
+    return DepthPosterior(of_grid, planes, nothing, 1, in_focus, nowhere, is_supported)
+
+
+@pytest.mark.parametrize("supported", [False, True])
+def test_a_posterior_follows_its_sheets_where_photons_tell_the_depth(supported: bool) -> None:
+    planes_px = np.arange(2.0, 26.0)
+    far, near = (np.abs(planes_px - 4 * step) < 1.5 for step in (FAR_STEP, NEAR_STEP))
+    one = (0.2 * far + 0.1 * near).astype(np.float32)  # and .1 of no surface
+    posterior = posterior_of(
+        np.tile(one[:, None, None], (1, SIDE, SIDE)), planes_px, requested=2, supported=supported
+    )
+    sheets = sheets_of(bars())
+    before = np.stack([np.full((SIDE, SIDE), share, np.float32) for share in (0.3, 0.6)])
+    same = posterior_after(posterior, sheets, Explanation(before, before), 0.02)
+    np.testing.assert_allclose(same.probability, posterior.probability, atol=1e-6)
+    np.testing.assert_allclose(same.in_focus, posterior.in_focus, atol=1e-6)
+    grown = posterior_after(posterior, sheets, Explanation(before, before[::-1]), 0.0)
+    np.testing.assert_allclose(grown.probability.sum(axis=0) + grown.no_surface, 1, atol=1e-5)
+    np.testing.assert_allclose(grown.in_focus[0] / grown.in_focus[1], 4, rtol=1e-4)
+    share = grown.probability[:, 9, 9]
+    is_near = planes_px > 14
+    mean_px = [np.average(planes_px[part], weights=share[part]) for part in (~is_near, is_near)]
+    assert mean_px == pytest.approx([8, 20], abs=1e-3)
+    # Twice the near sheet and half the far one count half, in logarithms: .3 and .6 to .424 each, beside .1.
+    assert share[is_near].sum() == pytest.approx(0.4473 if supported else 0.3, abs=1e-3)
+
+
 def test_sheets_are_the_connected_parts_of_smooth_depth_from_near_to_far() -> None:
     planes_px, rows = np.arange(5.0, 25.0), np.arange(SIDE)
     slope_px = 8 + rows / 12  # to 12 px, one block after the other by less than a plane
     depth_px = np.where(rows[:, None] < 8 + rows[:, None] // 2, slope_px[:, None], 20.0) * np.ones(SIDE)
     depth_px[30:, 30:] = 20.0
     probability = np.maximum(1 - np.abs(depth_px - planes_px[:, None, None]), 0).astype(np.float32)
-    planes = FocalPlanes.at_total_disparity(unit_grid(CAMERAS, CAMERAS, SIDE, SIDE), planes_px)
-    in_focus, nowhere = np.full((2, SIDE, SIDE), 0.45, np.float32), np.zeros((SIDE, SIDE), bool)
-    nothing = np.asarray(1 - probability.sum(axis=0), np.float32)
-    posterior = DepthPosterior(planes, probability, nothing, 1, in_focus, nowhere, ~nowhere)
+    posterior = posterior_of(probability, planes_px, requested=2, supported=True)
     sheets = cut_sheets(posterior, depth_px, np.array([20.5, 15.0]), SheetModel())
     middle_px = np.median(sheets.total_px, axis=(1, 2))
     assert len(middle_px) == 3
