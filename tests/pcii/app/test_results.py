@@ -1,6 +1,6 @@
 """The folder of results: what comes back, through failures, damage and other writers."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from pcii.app import load_estimates, save_depth, save_sections, save_segmented
 from pcii.app.results import writing
 from pcii.sections import reconstruct
 from pcii.store import RESULTS, Dataset, DatasetManifest, read_results, verify
-from pcii.types import DepthMap, PhotonCounts, Segmented
+from pcii.types import DepthMap, Light, PhotonCounts, Segmented
 
 GRID = unit_grid(2, 2, 6, 7)
 Z = np.array([0.5, 1.0])
@@ -75,6 +75,8 @@ def test_folders_of_other_things_are_refused(saved: Path, tmp_path: Path) -> Non
     dataset, other = dataset_of(tmp_path), dataset_of(tmp_path, "b")
     assert "of another dataset or light" in one_sentence(lambda: save(saved, other, 1), saved)
     assert "of another dataset or light" in one_sentence(lambda: load_estimates(saved, other), saved)
+    darker = replace(dataset, choice=Light(1))
+    assert "of another dataset or light" in one_sentence(lambda: save(saved, darker, 1), saved)
     assert "dataset itself" in one_sentence(lambda: save(dataset.path, dataset, 1), dataset.path)
     thesis = tmp_path / "thesis.tex"
     thesis.write_text("years of work")

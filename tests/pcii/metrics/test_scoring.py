@@ -140,7 +140,9 @@ def test_without_truth_everything_unknown_is_none() -> None:
     assert result.bounds == {"objects": []}
 
 
-def photon_score(kept: list[bool] | None, kind: str = "pixel") -> tuple[float | None, float | None]:
+def photon_score(
+    kept: list[bool] | None, kind: str = "pixel", unscored: frozenset[int] = frozenset()
+) -> tuple[float | None, float | None]:
     """Precision and recall of four events of 3, 1, 2 and 1 photons; the third sent one photon of each kind.
 
     They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
@@ -160,7 +162,7 @@ def photon_score(kept: list[bool] | None, kind: str = "pixel") -> tuple[float | 
     z = np.full((200, 200), np.inf)
     ids = np.zeros((200, 200), dtype=np.int16)
     z[0], ids[0], z[1], ids[1] = 541.0, 1, 625.0, 2
-    true = Truth(z, ids, {1: "near", 2: "far"}, photons)
+    true = Truth(z, ids, {1: "near", 2: "far"}, photons, unscored=unscored)
     masks = np.zeros((1, 200, 200), dtype=bool)
     masks[0, 41, 41] = True  # where the event of three photons is projected to
     said = None if kept is None else np.array([kept])
@@ -182,6 +184,11 @@ def test_what_is_said_of_events_goes_before_the_mask() -> None:
     assert photon_score([False] * 4) == (None, 0.0)
     # The far object does not belong to the only plane.
     assert photon_score([True, False, True, False], "object") == (4 / 5, 1.0)
+
+
+def test_photons_of_what_is_not_scored_do_not_count() -> None:
+    assert photon_score([False, True, False, False], "object") == (0.0, 0.0)
+    assert photon_score([False, True, False, False], "object", frozenset({2})) == (None, 0.0)
 
 
 def test_photons_of_other_events_are_refused() -> None:
