@@ -27,7 +27,7 @@ TRAIN_MINUTES ?= 90
 $(VENV)/.ready: pyproject.toml
 	@echo "Installing the renderer and the analysis in $(VENV): 1 GB, which takes some minutes ..."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar off --editable '.[render]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[render]'
 	@touch $@
 
 $(VENV)/.ready-dev: $(VENV)/.ready
