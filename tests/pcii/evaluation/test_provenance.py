@@ -1,18 +1,23 @@
 """What other software made is made again, in evaluations and in results alike, and it is said why."""
 
+import ast
 import hashlib
 import html
-from importlib.metadata import version
+import sys
+from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
 import pytest
 from other_packages import install_package
 from tiny_datasets import OWN, write_dataset
 
+import pcii
 from pcii.evaluation import NamedMethod, evaluate, read_rows, software_of
 from pcii.evaluation.rows import writing_rows
-from pcii.store import machine
+from pcii.store import machine, own_software
 
+COMPUTES = ("base", "types", "sections", "evidence", "depth", "removal", "metrics")
+DRAWS_TALKS_OR_LOADS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed", "lazy-loader"}
 CODE = """
 from pcii import DepthMap, Segmented
 from pathlib import Path
@@ -27,6 +32,20 @@ def map_depth(data, z_range_mm):
     return DepthMap(np.full(film, z_range_mm[0]), np.ones(film))
 """
 POINTS = {"pcii.methods": {"learned": "strange:remove"}, "pcii.depth_methods": {"near": "strange:map_depth"}}
+
+
+def test_every_package_that_computes_is_recorded() -> None:
+    imported = set[str]()
+    for room in COMPUTES:
+        for file in (Path(pcii.__file__).parent / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module)
+    roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
+    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
+    assert packages - DRAWS_TALKS_OR_LOADS <= set(own_software())
 
 
 def test_rows_of_other_software_are_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
