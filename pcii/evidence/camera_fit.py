@@ -50,11 +50,14 @@ BETTER = 0.75
 SHARP, MIN_SHARP = 0.5, 0.02
 """At a surface the variance is at most this share of its mean over the planes; least share of such cells. If
 the latter is smaller, noise is taken for surfaces; if larger, small things are not seen."""
-PEAK_SHARE = 0.08
-"""Least share of what is sharp that a depth has. If it is smaller, chance makes depths."""
-BEHIND_SHARE, STRAY_SHARE = 0.12, 0.02
-"""Largest share of what is sharp that may be behind the cameras by chance, without a warning and after a
-shift. If the latter is smaller, single cells make the shift larger."""
+MIN_PEAK_SHARE = 0.08
+"""Least share of all sharp cells that lie around a reported depth. If it is smaller, chance makes depths; if
+larger, small surfaces are left out."""
+MAX_BEHIND_SHARE = 0.12
+"""Largest share of what is sharp that may lie behind the cameras unwarned: chance puts some there."""
+LEFT_BEHIND_SHARE = 0.02
+"""Share of what is sharp that the advised shear leaves behind the cameras. If it is smaller, single cells
+that are sharp by chance make the shear larger."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def check_grid(
         return fit
     fit = replace(fit, order=None if best == order else best)
     mass = _by_plane(variance, sharpness * is_sharp)
-    if mass[total_px < -side].sum() > BEHIND_SHARE:
+    if mass[total_px < -side].sum() > MAX_BEHIND_SHARE:
         return _in_front(fit, best, grids[best], mass, shifts_px, side)
     if fit.order is not None:
         return fit
@@ -125,10 +128,10 @@ def _in_front(
 ) -> CameraFit:
     """The fit of views in which much is sharp behind the cameras: the order or the shear that mends it."""
     is_behind = _still_px(grid) - shifts_px < -side  # of views whose two axes are turned
-    if mass[is_behind].sum() <= BEHIND_SHARE and not is_behind[_peaks(mass)].any():
+    if mass[is_behind].sum() <= MAX_BEHIND_SHARE and not is_behind[_peaks(mass)].any():
         rows, cols = order.flip_rows ^ (grid.rows > 1), order.flip_cols ^ (grid.cols > 1)
         return replace(fit, order=replace(order, flip_rows=rows, flip_cols=cols))
-    least_px = float(shifts_px[np.searchsorted(mass.cumsum(), STRAY_SHARE)])
+    least_px = float(shifts_px[np.searchsorted(mass.cumsum(), LEFT_BEHIND_SHARE)])
     x, y = 2 * max(-least_px, 0.0) * parallax_per_total(grid)  # as far in front as it was behind
     return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
 
@@ -284,5 +287,5 @@ def _peaks(mass: np.ndarray) -> list[int]:
     """Planes at which more is sharp than at their neighbours, those of most first."""
     padded = np.pad(mass, 1)
     around = padded[:-2] + padded[1:-1] + padded[2:]
-    is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= PEAK_SHARE)
+    is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= MIN_PEAK_SHARE)
     return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MAX_PEAKS]

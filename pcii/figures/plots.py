@@ -50,7 +50,7 @@ MAX_NAMES = 40
 """Largest number of objects whose names stand at a picture: those of the largest objects."""
 NAME_LINES = 16
 """Names in a column."""
-SCALE_BAR_SHARE = 0.3
+MAX_SCALE_BAR_SHARE = 0.3
 """Longest scale bar as a share of the picture's width."""
 
 
@@ -254,7 +254,7 @@ def _draw_scale_bar(axes: "Axes", mm_per_px: float | None) -> None:
     hide_frame(axes)
     left, right = axes.get_xlim()
     px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
-    longest = SCALE_BAR_SHARE * (right - left) / px
+    longest = MAX_SCALE_BAR_SHARE * (right - left) / px
     decade = 10.0 ** math.floor(math.log10(longest))
     length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
     place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}

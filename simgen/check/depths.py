@@ -36,7 +36,7 @@ def depth_findings(facts: Facts) -> list[Finding]:
     if not facts.planes_mm:
         return []
     findings: list[Finding] = []
-    if facts.seen:
+    if facts.visible_objects:
         findings = [_disparity_finding(facts), *_separation_findings(facts)]
     if facts.scored:
         findings += _focus_findings(facts)
@@ -45,7 +45,7 @@ def depth_findings(facts: Facts) -> list[Finding]:
 
 def _disparity_finding(facts: Facts) -> Finding:
     """Disparity of the nearest and farthest point of any object, and the blur between the two."""
-    grid, (near_mm, far_mm) = facts.grid, _depths_of(facts.seen)
+    grid, (near_mm, far_mm) = facts.grid, _depths_of(facts.visible_objects)
     spread_px = float(apart_px(grid, near_mm, far_mm))
     text = (
         f"{_disparity(facts, near_mm)} at the nearest point, {near_mm:.0f} mm, and "

@@ -88,14 +88,14 @@ class Facts:
         return self.target.recipe.grid.camera_grid()
 
     @property
-    def seen(self) -> tuple[ObjectFacts, ...]:
+    def visible_objects(self) -> tuple[ObjectFacts, ...]:
         """The objects that the virtual centre sees."""
         return tuple(thing for thing in self.objects if thing.z_mm.size)
 
     @property
     def scored(self) -> tuple[ObjectFacts, ...]:
-        """Those of them that count in scores."""
-        return tuple(thing for thing in self.seen if thing.is_scored)
+        """The visible objects that count in scores."""
+        return tuple(thing for thing in self.visible_objects if thing.is_scored)
 
     @cached_property
     def planes_mm(self) -> tuple[float, ...]:

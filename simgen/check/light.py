@@ -26,8 +26,8 @@ def photon_findings(facts: Facts) -> list[Finding]:
     if facts.plan is None or facts.luminance <= 0 or not facts.plan.photons_per_view > 0:
         return []
     total = photons_per_view(facts, np.ones(facts.colour_share.size))
-    findings = [_object_finding(facts, thing, total) for thing in facts.seen]
-    if facts.seen:
+    findings = [_object_finding(facts, thing, total) for thing in facts.visible_objects]
+    if facts.visible_objects:
         findings += _other_findings(facts, total)
     findings += _saturation_findings(facts)
     sensor, grid = facts.target.recipe.sensor, facts.grid
@@ -51,7 +51,7 @@ def _other_findings(facts: Facts, total: float) -> list[Finding]:
             findings.append(Finding("warn", "photons", text, remedy))
         else:
             findings.append(Finding("ok", "photons", text))
-    unscored = [thing for thing in facts.seen if not thing.is_scored]
+    unscored = [thing for thing in facts.visible_objects if not thing.is_scored]
     if unscored:
         part = sum(photons_per_view(facts, thing.light_share) for thing in unscored) / total
         text = f"{part:.1%} of the photons come from objects that count in no score"
@@ -104,9 +104,9 @@ def _saturation_findings(facts: Facts) -> list[Finding]:
     """What frames of few bits lose of the object that is brightest on the film."""
     sensor = facts.target.recipe.sensor
     limit = sensor.readout.most_per_frame
-    if limit is None or not facts.seen:
+    if limit is None or not facts.visible_objects:
         return []
-    brightest = max(facts.seen, key=lambda thing: _per_pixel(facts, thing))
+    brightest = max(facts.visible_objects, key=lambda thing: _per_pixel(facts, thing))
     per_frame = _per_pixel(facts, brightest) / sensor.frames
     lost = 1 - float(clipped_mean(np.array(per_frame), limit)) / per_frame if per_frame > 0 else 0.0
     text = f"{brightest.name}: {per_frame:.2g} photons per pixel and frame, of which {lost:.1%} saturate"

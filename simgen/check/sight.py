@@ -13,7 +13,7 @@ def sight_findings(facts: Facts) -> list[Finding]:
     """All findings of this file."""
     by_name = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
     findings = [finding for of_object in by_name.values() for finding in of_object]
-    whole = [thing.name for thing in facts.seen if not by_name[thing.name]]
+    whole = [thing.name for thing in facts.visible_objects if not by_name[thing.name]]
     if whole:
         findings.insert(0, Finding("ok", "objects", f"the centre and the corner cameras see {listed(whole)}"))
     if not facts.objects:

@@ -36,8 +36,8 @@ def mesh_folder() -> Path:
 
 
 def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
-    """The shape of a grid of points (rows, columns, 3), so many millimetres for one unit, along each axis or
-    along all three."""
+    """The mesh of a grid of points (rows, columns, 3); `sizes_mm` is the length of one unit, for each axis or
+    for all three."""
     rows, columns, _ = points.shape
     right, up = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
     vertices = np.concatenate([np.round(points, 4), right[..., None], up[..., None]], axis=-1).astype("<f4")

@@ -42,11 +42,14 @@ MAX_THINNED_PHOTONS = 1e10
 """Largest number of photons that are thinned, which takes two cores four hours, as a hundred views of
 `MOST_PATHS` do."""
 MAX_NOISE_SHARE = 0.01
+"""Largest variance that rendering adds to counts, as a share of their Poisson variance."""
 MAX_NORMALISER_ERROR = 0.003
+"""Largest standard error of the light that a budget is divided by, as a share of it."""
 PROBE_SAMPLES = 64
-WORST_SHARE = 0.1
-"""Least share of the noise of light that is named as its cause: where the probe has met a small lamp a few
-times its variance is too large by several times."""
+"""Samples per pixel of each of the two halves of the probe."""
+MIN_CAUSE_SHARE = 0.1
+"""Least share of the noise that bright light has to make to be named as its cause: where the probe has met a
+small lamp a few times its variance is too large by several times."""
 
 
 class Probe(NamedTuple):
@@ -79,7 +82,7 @@ class Probe(NamedTuple):
     def why_noisy(self, pixels: int) -> str:
         """A clause on the bright light that makes most of the noise of a film of `pixels`, if any does."""
         worst = max(self.bright_light, key=lambda row: _noise([row]), default=None)
-        if worst is None or _noise([worst]) < WORST_SHARE * self.variance * pixels:
+        if worst is None or _noise([worst]) < MIN_CAUSE_SHARE * self.variance * pixels:
             return ""
         share = worst.light / (self.mean * pixels)
         return (
@@ -160,7 +163,7 @@ def plan_counts(
 
 
 def _thins(capture: Capture, kind: str, photons: float, samples: int) -> bool:
-    """Whether to thin a view's photons takes less time than to render it with so many samples per pixel."""
+    """Whether thinning `photons` of a view takes no more time than rendering it with `samples` per pixel."""
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
@@ -168,7 +171,7 @@ def _thins(capture: Capture, kind: str, photons: float, samples: int) -> bool:
 
 
 def _are_few(capture: Capture, photons: float) -> bool:
-    """Whether so many photons in each view can be kept one by one."""
+    """Whether this number of photons in each view can be kept one by one."""
     return photons * capture.grid.view_count <= MAX_SINGLE_PHOTONS
 
 

@@ -261,7 +261,7 @@ def test_the_probe_finds_what_is_hidden_behind_and_beside() -> None:
     places = {"front": (0, 500), "hidden": (0, 900), "behind": (0, -500), "beside": (5000, 500)}
     objects = [ball(name, x_mm, z_mm, GREY) for name, (x_mm, z_mm) in places.items()]
     known = probed(objects, SKY, AWAY)
-    assert [thing.name for thing in known.seen] == ["front"]
+    assert [thing.name for thing in known.visible_objects] == ["front"]
     assert known.objects[2].body_z_mm == pytest.approx((-620, -380))
     assert known.lamps_away == ()  # a ball stands behind the cameras, where the lamp points
     bad = {one.text: one.remedy for one in about("objects", known) if one.verdict == "bad"}
