@@ -14,9 +14,8 @@ from benchmarks.page import tables_of, write_page
 from benchmarks.quoted import add, add_benchmark, add_study, read_figures, write_figures
 from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_json_safely
-from pcii.figures.pages import table_markdown
+from pcii.base import InputError, write_json_safely
+from pcii.figures import table_markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 

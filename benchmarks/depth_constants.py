@@ -14,16 +14,14 @@ from typing import Any
 import numpy as np
 
 import pcii
-from pcii.base.progress import Stages
-from pcii.depth.posterior_depth import PosteriorDepth, depth_map_of
-from pcii.evaluation.comparison import find_datasets
-from pcii.evaluation.measurement import tasks_of
-from pcii.evaluation.method_names import NamedMethod
+from pcii.base import Stages
+from pcii.depth import PosteriorDepth, depth_map_of
+from pcii.evaluation import NamedMethod, find_datasets, tasks_of
 from pcii.evaluation.tables import light_name
-from pcii.figures.pages import table_markdown, text_table
-from pcii.removal.methods import masks_of
-from pcii.store.suggested_depths import depth_range_of, planes_of
-from pcii.types.photon_limit import Light
+from pcii.figures import table_markdown, text_table
+from pcii.removal import masks_of
+from pcii.store import depth_range_of, planes_of
+from pcii.types import Light
 
 PARTS = "model", "prior", "shown", "sheets", "search"
 """Of `PosteriorDepth`: those that have constants of their own, and its own constants."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.figures import draw
 from benchmarks.machine import in_words, was_busy
 from benchmarks.results import Record, Row, Study, Value, label
-from pcii.base.safe_files import write_bytes_safely
-from pcii.figures.pages import table_markdown, text_table
+from pcii.base import write_bytes_safely
+from pcii.figures import table_markdown, text_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame

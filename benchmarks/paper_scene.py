@@ -6,10 +6,10 @@ from pathlib import Path
 import pcii
 from benchmarks.quoted import named_means
 from benchmarks.results import Value, mean_of
-from pcii.base.progress import Stages
+from pcii.base import Stages
 from pcii.evaluation import summary
-from simgen.dataset.dataset_collection import generate_collection
-from simgen.spec.sweeps import load_sweep
+from simgen.dataset import generate_collection
+from simgen.spec import load_sweep
 
 FOLDER = "paper-scene"
 """Its datasets and scores, in the folder of results."""

@@ -15,14 +15,12 @@ from benchmarks.machine import commit, in_words
 from benchmarks.page import value_text
 from benchmarks.results import UNITS, Record, Value, value_of
 from benchmarks.studies import photon_costs
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely, write_json_safely
+from pcii.base import InputError, write_bytes_safely, write_json_safely
+from pcii.evaluation import SUBMISSION, frame_of, means, means_over_scenes, read_rows
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.rows import frame_of, origin_of, read_rows
-from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import lines_of, means, means_over_scenes
-from pcii.store.collection import IN_FRAMES
-from pcii.store.software import own_software
+from pcii.evaluation.rows import origin_of
+from pcii.evaluation.summary import lines_of
+from pcii.store import IN_FRAMES, own_software
 
 if TYPE_CHECKING:
     from pandas import DataFrame

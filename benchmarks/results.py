@@ -10,9 +10,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_json_safely
-from pcii.evaluation.summary import mean_interval
+from pcii.base import InputError, write_json_safely
+from pcii.evaluation import mean_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

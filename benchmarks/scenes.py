@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from simgen.dataset.prepared import prepare
-from simgen.photons.capture import Capture
-from simgen.spec.recipe import Recipe
+from simgen.dataset import prepare
+from simgen.photons import Capture
+from simgen.spec import Recipe
 
 
 def capture_of(recipe: Recipe) -> Capture:

@@ -14,24 +14,16 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
-from pcii.base.progress import silent
-from pcii.sections import reconstruction
-from pcii.sections.reconstruction import extend, reconstruct
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import MANIFEST, TRUTH
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import sense
-from pcii.types.section_stack import Sections
-from simgen.dataset.generation import Reuse, generate, make
-from simgen.dataset.prepared import Prepared, prepare
-from simgen.photons.capture import Capture
-from simgen.photons.exploration import Plan, explore
-from simgen.photons.thinning import thin_photons
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.spec.recipe import Recipe
-from simgen.truth import first_hits
-from simgen.truth.first_hits import first_hits_at_centre, visible_views
+from pcii.base import silent
+from pcii.sections import extend, reconstruct, reconstruction
+from pcii.store import MANIFEST, TRUTH, open_dataset
+from pcii.types import FocalPlanes, PhotonCounts, Sections, sense
+from simgen.dataset import Prepared, generate, prepare
+from simgen.dataset.generation import Reuse, make
+from simgen.photons import Capture, Plan, explore, thin_photons
+from simgen.renderer import RenderScene
+from simgen.spec import Recipe
+from simgen.truth import first_hits, first_hits_at_centre, visible_views
 
 Arrays = Mapping[str, np.ndarray]
 DEPTH = f"{TRUTH}/z_mm"

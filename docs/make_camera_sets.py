@@ -12,8 +12,8 @@ import pandas as pd
 
 import pcii
 import simgen
-from pcii.depth.posterior_depth import depth_map_of
-from pcii.removal.methods import masks_of
+from pcii.depth import depth_map_of
+from pcii.removal import masks_of
 
 SIDE_PX, FILM_MM, FOCAL_MM = 256, 36.0448, 50.0
 FAR_MM, NEAR_MM = 620.0, 540.0

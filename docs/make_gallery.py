@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from simgen.app.pictures import draw_preview
-from simgen.check.targets import load_target
-from simgen.spec.recipe_files import load_recipe
-from simgen.spec.scene_lookup import load_scene
+from simgen.check import load_target
+from simgen.spec import load_recipe, load_scene
 
 DOCS = Path(__file__).resolve().parent
 SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"

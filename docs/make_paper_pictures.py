@@ -14,9 +14,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 import pcii
-from pcii.figures.pictures import depth_image, filled_means, smoothed, smoothing_for, to_srgb8, white_level
-from pcii.metrics.true_masks import TrueFocus
-from pcii.types.bayer import colour_index
+from pcii.figures import depth_image, filled_means, smoothed, smoothing_for, to_srgb8, white_level
+from pcii.metrics import TrueFocus
+from pcii.types import colour_index
 
 DOCS = Path(__file__).parent
 PART = np.s_[394:640, 300:720]

@@ -13,14 +13,13 @@ import pandas as pd
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from pcii.evaluation import SUBMISSION, frame_of, means, read_rows
 from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.rows import frame_of, read_rows
-from pcii.evaluation.submissions import SUBMISSION
-from pcii.evaluation.summary import means, with_yardsticks
+from pcii.evaluation.summary import with_yardsticks
 from pcii.figures.charts import quiet_grid
 from pcii.figures.panels import COLOURS, MARKERS
-from pcii.store.collection import IN_FRAMES
-from simgen.dataset.benchmark_making import load_definition
+from pcii.store import IN_FRAMES
+from simgen.dataset import load_definition
 
 
 def results(submissions: Path) -> pd.DataFrame:

@@ -3,8 +3,7 @@
 import shutil
 
 import simgen
-from pcii.store.dataset import SAMPLE
-from pcii.store.verification import verify
+from pcii.store import SAMPLE, verify
 
 LARGEST_BYTES = 2_000_000
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from simgen.assets.texture_pixels import paint
-from simgen.spec.materials import Checks, Edge, Noise, Star, Stripes, Text
+from simgen.assets import paint
+from simgen.spec import Checks, Edge, Noise, Star, Stripes, Text
 
 TILE_PX, GAP_PX = 180, 8
 BLUE, YELLOW = (0.1, 0.25, 0.6), (0.95, 0.8, 0.3)

@@ -16,8 +16,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 import pcii
-from pcii.base.srgb import linear_to_srgb
-from pcii.figures.pictures import to_srgb8, white_level, write_png
+from pcii.base import linear_to_srgb
+from pcii.figures import to_srgb8, white_level, write_png
 
 WALL_MM, RING_MM, STAR_MM = 190.0, 90.0, 45.0
 Panels = Iterator[tuple[float, np.ndarray]]

@@ -16,10 +16,7 @@ DEFINITION: dict[str, Any] = {
     "brighter_photons_per_view": [3000],
     "seeds": [1, 2, 3],
     "frames": 200,
-    "set": [
-        *(f"{name}={value}" for name, value in SMALL.items()),
-        "render.samples_per_pixel=1",
-    ],
+    "set": [*(f"{name}={value}" for name, value in SMALL.items()), "render.samples_per_pixel=1"],
     "publication": {"licence": "CC-BY-4.0"},
     "scene": [
         SCENE | {"name": "pair", "frames": True},

@@ -4,14 +4,7 @@ from typing import Any
 
 TINY_RECIPE: dict[str, Any] = {
     "scene": "two_objects",
-    "grid": {
-        "rows": 2,
-        "cols": 3,
-        "pitch_mm": [18.0, 18.0],
-        "pixel_mm": 0.5632,
-        "height": 64,
-        "width": 60,
-    },
+    "grid": {"rows": 2, "cols": 3, "pitch_mm": [18.0, 18.0], "pixel_mm": 0.5632, "height": 64, "width": 60},
 }
 
 GRID_2_X_3 = """

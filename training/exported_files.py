@@ -5,7 +5,7 @@ from pathlib import Path
 import torch  # pyright: ignore[reportMissingImports]
 from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
-from pcii.depth.network_inputs import NetworkInputs
+from pcii.depth import NetworkInputs
 from training.layers import SurfaceNetwork
 
 OPSET = 18

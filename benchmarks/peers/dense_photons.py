@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pcii.types.photon_limit import Light, photon_rates, scope_energies, sense
-from simgen.photons.capture import Capture
-from simgen.renderer.radiance import render_view
+from pcii.types import Light, photon_rates, scope_energies, sense
+from simgen.photons import Capture
+from simgen.renderer import render_view
 
 
 def rendered_mosaic(capture: Capture, view: int, samples_per_pixel: int, seed: int) -> np.ndarray:

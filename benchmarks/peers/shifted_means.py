@@ -4,9 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import disparity_px
+from pcii.types import CameraGrid, FocalPlanes, disparity_px
 
 
 def by_scipy(images: np.ndarray, grid: CameraGrid, z_mm: float, order: int = 1) -> np.ndarray:

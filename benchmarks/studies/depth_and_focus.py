@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.figures import curve, frame
 from benchmarks.results import Measured, Parameter, Row, Size, Study, Value, value_of
 from benchmarks.scenes import film
-from pcii.base.progress import Stages
-from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
-from pcii.evaluation.summary import lines_of, means
+from pcii.base import Stages
+from pcii.evaluation import depth_name, evaluate, means
+from pcii.evaluation.method_names import estimator_of, methods_for
+from pcii.evaluation.summary import lines_of
 from pcii.evaluation.tables import SWEEPS
-from simgen.dataset.dataset_collection import generate_collection
-from simgen.spec.sweeps import load_sweep
+from simgen.dataset import generate_collection
+from simgen.spec import load_sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

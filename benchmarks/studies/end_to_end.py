@@ -19,7 +19,7 @@ from benchmarks.figures import bars
 from benchmarks.results import Measured, Row, Size, Study, Value
 from benchmarks.scenes import film
 from benchmarks.timing import median_of, ratio_of
-from simgen.spec.recipe_files import load_recipe
+from simgen.spec import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,9 +15,9 @@ from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Row, Size, Study, Value
 from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from pcii.types.camera_grid import CameraGrid
-from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe_files import load_recipe
+from pcii.types import CameraGrid
+from simgen.photons import thin_photons
+from simgen.spec import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

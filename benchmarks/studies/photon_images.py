@@ -15,9 +15,8 @@ from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from simgen.photons.capture import Capture
-from simgen.photons.thinning import thin_photons
-from simgen.spec.recipe_files import load_recipe
+from simgen.photons import Capture, thin_photons
+from simgen.spec import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,10 +10,9 @@ from benchmarks.machine import has
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import capture_of, film
 from benchmarks.timing import median_of, side_by_side
-from simgen.photons.capture import Capture
-from simgen.renderer import backend
-from simgen.renderer.radiance import render_view
-from simgen.spec.recipe_files import load_recipe
+from simgen.photons import Capture
+from simgen.renderer import backend, render_view
+from simgen.spec import load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,12 +14,8 @@ from benchmarks.machine import has
 from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.timing import median_of, side_by_side
-from pcii.sections.demosaicing import demosaic
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.bayer import mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections import demosaic, reconstruct
+from pcii.types import CameraGrid, PhotonCounts, Views, mosaic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

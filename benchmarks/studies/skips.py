@@ -16,9 +16,8 @@ from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.scenes import film
 from benchmarks.skip_pairs import SKIPS, Arrays, Skip, World
 from benchmarks.timing import median_of, ratio_of
-from simgen.drawn.kinds import FIRST_UNSEEN
-from simgen.spec.recipe import Recipe
-from simgen.spec.recipe_files import load_recipe
+from simgen.drawn import FIRST_UNSEEN
+from simgen.spec import Recipe, load_recipe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

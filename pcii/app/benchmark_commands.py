@@ -6,14 +6,16 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from pcii.app.command_options import Out, Workers
-from pcii.base.command_line import say, say_next_page
-from pcii.base.executor import THIS_PROCESS
-from pcii.base.progress import Stages
-from pcii.evaluation.benchmark_page import write_page
-from pcii.evaluation.benchmark_scores import open_benchmark, run_method, score_submission
-from pcii.evaluation.comparison import Evaluation
-from pcii.evaluation.tables import decisive_means
-from pcii.store.collection import Half
+from pcii.base import THIS_PROCESS, Stages, say, say_next_page
+from pcii.evaluation import (
+    Evaluation,
+    decisive_means,
+    open_benchmark,
+    run_method,
+    score_submission,
+    write_page,
+)
+from pcii.store import Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import CoercionError, Parameter, Token
 
-from pcii.base.executor import Executor
-from pcii.types.arrays import MOST_DEPTHS
+from pcii.base import Executor
+from pcii.types import MOST_DEPTHS
 
 
 def depths_mm(text: str) -> list[float]:

@@ -9,14 +9,10 @@ from pcii.app.benchmark_commands import benchmark, say_scores
 from pcii.app.command_options import Out, SectionDepths, Workers
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
-from pcii.base import command_line
-from pcii.base.command_line import results_folder, say, say_next
-from pcii.base.executor import THIS_PROCESS
-from pcii.base.progress import Stages
+from pcii.base import THIS_PROCESS, Stages, command_line, results_folder, say, say_next
 from pcii.evaluation import comparison
-from pcii.exchange.export_formats import export
-from pcii.store.dataset import copy_sample
-from pcii.store.verification import print_verification
+from pcii.exchange import export
+from pcii.store import copy_sample, print_verification
 
 app = command_line.command_app(
     "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."

@@ -8,30 +8,25 @@ from cyclopts import Parameter
 
 from pcii.app.command_options import Depths, Out
 from pcii.app.pipeline import depths_text, surface_depths
-from pcii.base.command_line import results_folder, say, say_next
-from pcii.base.errors import InputError
-from pcii.base.progress import Stages
-from pcii.evidence.camera_fit import CameraFit, check_grid
-from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.exchange.depth_files import NO_DEPTH, DepthFile
-from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
-from pcii.exchange.import_requests import (
+from pcii.base import InputError, Stages, results_folder, say, say_next
+from pcii.evidence import CameraFit, check_grid, without_hot_pixels
+from pcii.exchange import (
+    AS_COUNTED,
+    NO_DEPTH,
     Cameras,
+    DepthFile,
+    FrameFormat,
     Lenses,
+    Note,
     Pair,
     PictureLight,
+    ViewOrder,
     WholePair,
     read,
 )
-from pcii.exchange.stated_cameras import Note, ViewOrder
-from pcii.sections.photon_statistics import warn_of_saturation
-from pcii.store.dataset_writer import save_dataset
-from pcii.store.folders import check_free
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import limit_photons
+from pcii.sections import warn_of_saturation
+from pcii.store import check_free, save_dataset
+from pcii.types import FocalPlanes, PhotonCounts, Views, depth_of_total_disparity_mm, limit_photons
 
 MOVING_SHARE = 0.25
 """A point whose total disparity is this share of a view's longer side is elsewhere in each view, so that what

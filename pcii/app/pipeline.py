@@ -9,25 +9,32 @@ from typing import TypeVar
 
 import numpy as np
 
-from pcii.base.progress import Report, silent
-from pcii.depth.methods import (
+from pcii.base import Report, silent
+from pcii.depth import (
     DEFAULT_METHOD,
+    depth_map_of,
     depth_posterior,
     estimate_depth,
     find_depth_method,
     find_surfaces,
 )
-from pcii.depth.posterior_depth import depth_map_of
-from pcii.metrics.scoring import score
-from pcii.removal.methods import DEFAULT_METHODS, find_method, masks_of
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Dataset
-from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
-from pcii.types.focal_planes import FocalPlanes, check_depth_counts
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.metrics import score
+from pcii.removal import DEFAULT_METHODS, find_method, masks_of
+from pcii.sections import reconstruct
+from pcii.store import Dataset
+from pcii.types import (
+    DepthMap,
+    DepthPosterior,
+    FocalPlanes,
+    PhotonCounts,
+    Score,
+    Sections,
+    Segmented,
+    Views,
+    check_depth_counts,
+    depth_of_total_disparity_mm,
+    total_disparity_px,
+)
 
 Result = TypeVar("Result")
 

@@ -15,22 +15,13 @@ import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels, slider_panels
-from pcii.base.safe_files import write_bytes_safely
-from pcii.evaluation.method_names import NamedMethod, depth_name, software_of
-from pcii.evaluation.summary import mean_interval
-from pcii.figures.pages import NOT_KNOWN, emphasised, render_page, text_table
-from pcii.metrics.scoring import entropy_region
-from pcii.sections.photon_statistics import (
-    pooled_estimate,
-    pooled_samples,
-    region_entropy_bits,
-    section_window_px,
-)
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.software import machine
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
-from pcii.types.truth import Truth
+from pcii.base import write_bytes_safely
+from pcii.evaluation import NamedMethod, depth_name, mean_interval, software_of
+from pcii.figures import NOT_KNOWN, emphasised, render_page, text_table
+from pcii.metrics import entropy_region
+from pcii.sections import pooled_estimate, pooled_samples, reconstruct, region_entropy_bits, section_window_px
+from pcii.store import machine
+from pcii.types import PhotonCounts, Sections, Truth
 
 if TYPE_CHECKING:
     from pandas import DataFrame

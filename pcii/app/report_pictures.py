@@ -10,15 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.base.blocks import box_around
-from pcii.base.compiled_loops import each_in_threads
-from pcii.figures.panels import colour_bar_uri
-from pcii.figures.pictures import (
+from pcii.base import box_around, each_in_threads
+from pcii.figures import (
     DEPTH_COLOURS,
     ERROR_COLOURS,
     SHARE_COLOURS,
     agreement_image,
     block_px,
+    colour_bar_uri,
     drawing_uri,
     exposed,
     map_image,
@@ -27,12 +26,9 @@ from pcii.figures.pictures import (
     photon_picture,
     smoothing_for,
 )
-from pcii.metrics.true_masks import TrueFocus
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.bayer import colours_and_samples
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import total_disparity_px
-from pcii.types.section_stack import Sections
+from pcii.metrics import TrueFocus
+from pcii.sections import reconstruct
+from pcii.types import FocalPlanes, Sections, colours_and_samples, total_disparity_px
 
 LONGEST_PX = 640
 """Longer sides of pictures are shown in blocks of 2 x 2 pixels, or of more."""

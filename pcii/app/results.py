@@ -22,36 +22,43 @@ import numpy as np
 
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
-from pcii.base.safe_files import (
+from pcii.base import (
+    InputError,
+    Report,
     locked,
     named_in_errors,
     new_folder_safely,
+    silent,
     temporaries_of,
     write_json_safely,
 )
-from pcii.depth.methods import DEFAULT_METHOD
-from pcii.evaluation.measurement import identity_of
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Dataset
-from pcii.store.folders import (
+from pcii.depth import DEFAULT_METHOD
+from pcii.evaluation import identity_of
+from pcii.sections import reconstruct
+from pcii.store import (
     RESULTS,
     RESULTS_FOLDER,
+    Dataset,
     Files,
     entries,
     list_files,
     lists_part,
+    own_software,
+    read_array,
     read_part,
     read_results,
     unlisted_files,
+    write_arrays_safely,
 )
-from pcii.store.software import own_software
-from pcii.store.zarr_groups import read_array, write_arrays_safely
-from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.section_stack import Sections
+from pcii.types import (
+    DEPTH_LABELS,
+    SECTIONS_LABELS,
+    SEGMENTED_LABELS,
+    DepthMap,
+    FocalPlanes,
+    Sections,
+    Segmented,
+)
 
 SECTIONS, DEPTH, SCORE, REPORT = "sections.zarr", "depth.zarr", "score.json", "report.html"
 

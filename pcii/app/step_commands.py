@@ -15,24 +15,23 @@ from pcii.app.command_options import (
 )
 from pcii.app.pipeline import full_light_sections, surface_depths
 from pcii.app.report import result_tables
-from pcii.base.command_line import say, say_next, say_next_page
-from pcii.base.errors import InputError
-from pcii.base.progress import Stages
-from pcii.base.safe_files import write_bytes_safely, write_json_safely
-from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
-from pcii.figures.panels import figure_bytes, new_figure
-from pcii.figures.pictures import exposed, mask_image, write_png
-from pcii.figures.plots import draw_depth
+from pcii.base import InputError, Stages, say, say_next, say_next_page, write_bytes_safely, write_json_safely
+from pcii.depth import DEFAULT_METHOD, estimate_depth
+from pcii.figures import draw_depth, exposed, figure_bytes, mask_image, new_figure, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
-from pcii.sections.reconstruction import reconstruct as reconstruct_sections
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.folders import read_results
-from pcii.store.software import differences, own_software
-from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_limit import Light
+from pcii.sections import reconstruct as reconstruct_sections
+from pcii.store import (
+    Dataset,
+    depth_range_of,
+    differences,
+    has_depths,
+    open_dataset,
+    own_software,
+    planes_of,
+    read_results,
+)
+from pcii.types import DepthMap, FocalPlanes, Light, Segmented
 
 DEPTH_IN = 9.0
 """Longest side of the picture of a depth map with its scale."""

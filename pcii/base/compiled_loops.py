@@ -63,9 +63,7 @@ def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -
     return results
 
 
-def shared(
-    count: Callable[..., int],
-) -> Callable[[Callable[..., Result]], Callable[..., list[Result]]]:
+def shared(count: Callable[..., int]) -> Callable[[Callable[..., Result]], Callable[..., list[Result]]]:
     """Decorator of a loop `loop(first, last, *arguments)`: compiled, called as `loop(*arguments)`.
 
     Threads share the indices from 0 to `count(*arguments)` - 1 (see `in_threads`).

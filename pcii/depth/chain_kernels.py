@@ -6,7 +6,7 @@ plane with probabilities that fall by a factor with each plane, or jumps to any 
 
 import numpy as np
 
-from pcii.base.compiled_loops import helper, shared
+from pcii.base import helper, shared
 
 
 @helper

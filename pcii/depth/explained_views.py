@@ -19,8 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.blocks import block_sums
-from pcii.base.compiled_loops import each_in_threads
+from pcii.base import block_sums, each_in_threads
 from pcii.depth.sheet_kernels import (
     add_up,
     expect_photons,
@@ -31,10 +30,8 @@ from pcii.depth.sheet_kernels import (
 )
 from pcii.depth.sheet_textures import smooth_texture, textures
 from pcii.depth.sheets import SheetModel, Sheets
-from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
-from pcii.types.estimates import DepthPosterior
-from pcii.types.geometry import parallax_per_total
-from pcii.types.photon_counts import PhotonCounts
+from pcii.evidence import doubled, gaussian_mean, gaussian_weights
+from pcii.types import DepthPosterior, PhotonCounts, parallax_per_total
 
 FILM_BLOCKS = 2
 """Distance in blocks between the places of a film for which expected photons are computed. If it is larger,

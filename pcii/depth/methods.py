@@ -13,17 +13,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.extensions import MethodRegistry, called
+from pcii.base import InputError, MethodRegistry, called
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
-from pcii.sections.photon_statistics import warn_of_saturation
-from pcii.types.arrays import check_z_mm
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, DepthPosterior
-from pcii.types.focal_planes import FocalPlanes, check_data
-from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections import warn_of_saturation
+from pcii.types import (
+    CameraGrid,
+    DepthMap,
+    DepthPosterior,
+    FocalPlanes,
+    PhotonCounts,
+    Views,
+    check_data,
+    check_z_mm,
+    depth_of_total_disparity_mm,
+    disparity_px,
+    total_disparity_px,
+)
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base.blocks import block_sums
+from pcii.base import block_sums
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
-from pcii.evidence.texture_evidence import TextureEvidence
+from pcii.evidence import TextureEvidence
 
 NETWORK_CELL_BLOCKS = 2
 """Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""
@@ -64,7 +64,7 @@ def inputs_of(
     All views together have `samples_per_block` samples in a block. `part` is rows and columns of blocks,
     whole cells. Beyond its end the film is mirrored: an empty border would look like the dark around things.
     """
-    from pcii.base.compiled_loops import each_in_threads
+    from pcii.base import each_in_threads
 
     planes = range(len(evidence.nats))
 

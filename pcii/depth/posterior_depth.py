@@ -11,26 +11,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base.blocks import box_around, on_pixels, window_sums
+from pcii.base import box_around, on_pixels, window_sums
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.sheets import SheetModel, cut_sheets
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
-from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.evidence.shown_depth import ShownDepth
-from pcii.evidence.texture_evidence import (
+from pcii.evidence import (
     PHOTON_CELL_BLOCKS,
+    ShownDepth,
     TextureEvidence,
     TextureModel,
     evidence_of_texture,
+    without_hot_pixels,
 )
-from pcii.sections.dense_sections import in_memory
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, DepthPosterior
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.sections import in_memory
+from pcii.types import (
+    CameraGrid,
+    DepthMap,
+    DepthPosterior,
+    FocalPlanes,
+    PhotonCounts,
+    Views,
+    depth_of_total_disparity_mm,
+    total_disparity_px,
+)
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
@@ -105,10 +109,7 @@ class PosteriorDepth:
         return depth_map_of(self.posterior(data, z_range_mm, z_mm), z_range_mm)
 
     def posterior(
-        self,
-        data: PhotonCounts | Views,
-        z_range_mm: tuple[float, float] | None,
-        z_mm: np.ndarray = NO_DEPTHS,
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float] | None, z_mm: np.ndarray = NO_DEPTHS
     ) -> DepthPosterior:
         """The posterior of planes through the range, if any, and around the planes at `z_mm` (R,); masks of
         these."""
@@ -126,7 +127,7 @@ class PosteriorDepth:
             data = in_memory(data)
         network = coarse = self._film_outputs(data, planes, inside, block_px, z_mm)
         if coarse_px > block_px:
-            from pcii.evidence.octave_kernels import doubled
+            from pcii.evidence import doubled
 
             coarse = self._film_outputs(data, planes, inside, coarse_px, z_mm)
             for mean, other in zip(network.maps, coarse.maps, strict=True):

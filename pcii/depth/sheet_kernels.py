@@ -8,7 +8,7 @@ probability t that no nearer one is there; m are masks and T textures, in photon
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper, shared
+from pcii.base import compiled, helper, shared
 
 LEAST_LEFT = np.float32(0.05)
 """Share of a texture that is left of it without the photon that it is to predict."""

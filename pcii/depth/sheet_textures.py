@@ -7,10 +7,10 @@ photon predicted by the others (the likelihood of leave-one-out).
 
 import numpy as np
 
-from pcii.base.blocks import block_sums
+from pcii.base import block_sums
 from pcii.depth.sheet_kernels import level_likelihoods, mix_levels
 from pcii.depth.sheets import SheetModel
-from pcii.evidence.octave_kernels import doubled, gaussian_mean, gaussian_weights
+from pcii.evidence import doubled, gaussian_mean, gaussian_weights
 
 
 def textures(

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.types.estimates import DepthPosterior
+from pcii.types import DepthPosterior
 
 
 @dataclass(frozen=True)

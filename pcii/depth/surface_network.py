@@ -55,7 +55,7 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     """
     import onnxruntime
 
-    from pcii.base.compiled_loops import each_in_threads, threads
+    from pcii.base import each_in_threads, threads
 
     trunk, head = _sessions(WEIGHTS, threads())
     options = onnxruntime.RunOptions()

@@ -14,16 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.blocks import block_sums, on_pixels
-from pcii.sections.demosaicing import demosaic
-from pcii.sections.dense_sections import in_memory
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import DepthMap
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px
-from pcii.types.images import Views, binary_scale
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.base import block_sums, on_pixels
+from pcii.sections import demosaic, in_memory, reconstruct
+from pcii.types import (
+    DepthMap,
+    FocalPlanes,
+    PhotonCounts,
+    Sections,
+    Views,
+    binary_scale,
+    depth_of_total_disparity_mm,
+    parallax_px,
+)
 
 STEP_PX = 1.0
 """Total disparity between neighbouring planes."""

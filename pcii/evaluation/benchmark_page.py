@@ -8,8 +8,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
+from pcii.base import InputError, write_bytes_safely
 from pcii.evaluation.benchmark_scores import TYPICAL_PHOTONS, by_scene
 from pcii.evaluation.evaluation_page import ABOUT_YARDSTICKS, accuracy_plot
 from pcii.evaluation.method_names import estimator_of, known_methods
@@ -25,10 +24,8 @@ from pcii.evaluation.summary import (
     with_yardsticks,
 )
 from pcii.evaluation.tables import TITLES, light_name, mean_table, rank_table
-from pcii.figures.pages import NOT_KNOWN, render_page, text_table
-from pcii.store.collection import IN_FRAMES
-from pcii.store.folders import ROWS
-from pcii.store.verification import verify
+from pcii.figures import NOT_KNOWN, render_page, text_table
+from pcii.store import IN_FRAMES, ROWS, verify
 
 if TYPE_CHECKING:
     from pandas import DataFrame

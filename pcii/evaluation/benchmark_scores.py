@@ -8,10 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pcii.base.errors import InputError
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Report, silent
-from pcii.base.safe_files import write_json_safely
+from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent, write_json_safely
 from pcii.evaluation.comparison import Evaluation
 from pcii.evaluation.evaluation_page import write_evaluation
 from pcii.evaluation.measurement import EvaluationJob, Task, measure, tasks_of
@@ -26,21 +23,20 @@ from pcii.evaluation.submissions import (
     read_submission,
     tasks_of_submission,
 )
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.collection import (
+from pcii.sections import reconstruct
+from pcii.store import (
     BENCHMARK_FIELDS,
     INDEX,
     Collection,
+    Dataset,
     Half,
     is_collection,
     open_collection,
+    planes_of,
     read_collection,
+    validated,
 )
-from pcii.store.dataset import Dataset
-from pcii.store.manifests import validated
-from pcii.store.suggested_depths import planes_of
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.photon_limit import FULL_LIGHT, Light
+from pcii.types import FULL_LIGHT, DepthMap, Light, Segmented
 
 TYPICAL_PHOTONS = 1000.0
 """Photons per view at which scenes and times are compared: those of the paper."""
@@ -164,11 +160,7 @@ def score_submission(
 
 
 def _score(
-    job: BenchmarkJob,
-    submission: ScoredSubmission,
-    out: Path,
-    executor: Executor,
-    report: Report,
+    job: BenchmarkJob, submission: ScoredSubmission, out: Path, executor: Executor, report: Report
 ) -> Evaluation:
     """Measure what is missing, and write the evaluation with what there is to say about the submission."""
     with writing_rows(out) as file:

@@ -6,20 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Report, silent
+from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent
 from pcii.evaluation import summary
 from pcii.evaluation.evaluation_page import AXES, ERRORS, accuracies, write_evaluation
 from pcii.evaluation.measurement import EvaluationJob, measure, tasks_of
 from pcii.evaluation.method_names import Method, named_methods
 from pcii.evaluation.rows import frame_of, key_of, origin_of, writing_rows
-from pcii.figures.charts import draw_accuracy, known_places
-from pcii.figures.panels import in_style, several_axes
-from pcii.store.collection import is_collection, read_index
-from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH
-from pcii.types.photon_limit import Light
+from pcii.figures import draw_accuracy, in_style, known_places, several_axes
+from pcii.store import COUNTS, MANIFEST, MARKER, RADIANCE, TRUTH, is_collection, open_dataset, read_index
+from pcii.types import Light
 
 if TYPE_CHECKING:
     import numpy as np

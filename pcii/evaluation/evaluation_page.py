@@ -7,13 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
+from pcii.base import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.summary import means, over_scenes, with_yardsticks
 from pcii.evaluation.tables import NOT_BETTER, TITLES, light_name, tables_of
-from pcii.figures.charts import PLACES, accuracy_chart, calibration_chart
-from pcii.figures.pages import render_page, text_table
-from pcii.figures.panels import figure_uri
-from pcii.store.folders import EVALUATION_FOLDER, ROWS, hash_file, list_files
+from pcii.figures import PLACES, accuracy_chart, calibration_chart, figure_uri, render_page, text_table
+from pcii.store import EVALUATION_FOLDER, ROWS, hash_file, list_files
 
 if TYPE_CHECKING:
     from pandas import DataFrame

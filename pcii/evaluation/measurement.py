@@ -11,29 +11,18 @@ from datetime import UTC, datetime
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError
-from pcii.base.executor import Executor
-from pcii.base.progress import Report
-from pcii.depth.methods import check_range_mm, estimate_depth
+from pcii.base import Executor, InputError, Report
+from pcii.depth import check_range_mm, estimate_depth
 from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for, software_of
 from pcii.evaluation.rows import Key, Row, RowFile, leaves
-from pcii.metrics.bounds import object_bounds
-from pcii.metrics.scoring import score
-from pcii.removal.methods import segment
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.dataset import Dataset
-from pcii.store.dataset_layout import TRUTH
-from pcii.store.folders import hash_json
-from pcii.store.software import differences, machine
-from pcii.store.suggested_depths import depth_range_of, has_depths, planes_of
-from pcii.types.estimates import DepthMap, Segmented
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import FULL_LIGHT, Light
-from pcii.types.section_stack import Sections
+from pcii.metrics import object_bounds, score
+from pcii.removal import segment
+from pcii.sections import reconstruct
+from pcii.store import TRUTH, Dataset, depth_range_of, differences, has_depths, hash_json, machine, planes_of
+from pcii.types import FULL_LIGHT, DepthMap, Light, PhotonCounts, Sections, Segmented, Views
 
 if TYPE_CHECKING:
-    from pcii.store.manifests import DatasetManifest
+    from pcii.store import DatasetManifest
 
 LIGHTS = ("photons.budget", "photons.nested")
 """Settings that say in which light a scene is seen, and nothing of the scene; it is the `budget` of a row."""

@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.base.extensions import load_function, name_of
-from pcii.base.plain_text import is_plain_name
+from pcii.base import InputError, is_plain_name, load_function, name_of
+from pcii.depth import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.depth import methods as depth
-from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.removal import methods as removal
-from pcii.removal.methods import removal_methods
-from pcii.store.software import own_software, software_with
+from pcii.removal import removal_methods
+from pcii.store import own_software, software_with
 
 DEPTH = "depth"
 """Names the default estimator of depth, which has its full name in rows."""

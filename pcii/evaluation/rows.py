@@ -19,9 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated, Any, Literal, NotRequired
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import locked, named_in_errors
-from pcii.store.folders import EVALUATION_FOLDER, ROWS
+from pcii.base import InputError, locked, named_in_errors
+from pcii.store import EVALUATION_FOLDER, ROWS
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -65,7 +64,7 @@ def _row_model() -> "TypeAdapter[Any]":
     from pydantic import BeforeValidator, Field, TypeAdapter
     from typing_extensions import TypedDict
 
-    from pcii.store.manifests import OPEN, Text
+    from pcii.store import OPEN, Text
 
     is_not_negative, by_names = Field(ge=0), BeforeValidator(_measures)
 
@@ -148,7 +147,7 @@ def read_rows(out: Path) -> list[Row]:
 def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
     from pydantic import ValidationError
 
-    from pcii.store.manifests import first_fault
+    from pcii.store import first_fault
 
     *lines, _ = content.split(b"\n")  # the last one is empty, or unfinished
     rows: dict[Key, Row] = {}

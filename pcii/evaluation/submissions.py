@@ -26,16 +26,11 @@ from pydantic import (
     model_validator,
 )
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import is_plain, web_address
+from pcii.base import InputError, is_plain, web_address
 from pcii.evaluation.measurement import Task
 from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of
-from pcii.store.collection import Half
-from pcii.store.dataset import Dataset
-from pcii.store.manifests import first_fault
-from pcii.store.suggested_depths import planes_of
-from pcii.types.estimates import DepthMap
-from pcii.types.photon_limit import FULL_LIGHT
+from pcii.store import Dataset, Half, first_fault, planes_of
+from pcii.types import FULL_LIGHT, DepthMap
 
 SUBMISSION = "submission.json"
 DEPTH_MAP, MASKS = "depth.npz", "masks.npz"

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.depth.methods import FOR_COUNTS
+from pcii.depth import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.summary import (
     LOOK_AT_NO_PHOTON,
@@ -16,7 +16,7 @@ from pcii.evaluation.summary import (
     ranked_over,
     ranks,
 )
-from pcii.figures.pages import NOT_KNOWN, emphasised, text_table
+from pcii.figures import NOT_KNOWN, emphasised, text_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series

@@ -14,19 +14,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.evidence.texture_evidence import evidence_of_texture
-from pcii.metrics.true_masks import TrueFocus
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.collection import Collection, Split, open_collection
-from pcii.store.dataset import Dataset
-from pcii.store.suggested_depths import depth_range_of
-from pcii.types.bayer import COLOURS, colour_index
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import total_disparity_px
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.base import InputError
+from pcii.evidence import evidence_of_texture
+from pcii.metrics import TrueFocus
+from pcii.sections import reconstruct
+from pcii.store import Collection, Dataset, Split, depth_range_of, open_collection
+from pcii.types import COLOURS, CameraGrid, FocalPlanes, PhotonCounts, Truth, colour_index, total_disparity_px
 
 Field = Literal["counts", "sections", "evidence", "truth"]
 Example = dict[str, np.ndarray]

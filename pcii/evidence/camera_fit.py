@@ -14,13 +14,17 @@ from functools import cache
 
 import numpy as np
 
-from pcii.base.blocks import block_sums, evenly_chosen
-from pcii.exchange.stated_cameras import AS_STORED, ViewOrder
-from pcii.store.dataset_writer import check_depth_range
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import depth_of_total_disparity_mm, parallax_per_total, total_disparity_px
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import block_sums, evenly_chosen
+from pcii.exchange import AS_STORED, ViewOrder
+from pcii.store import check_depth_range
+from pcii.types import (
+    CameraGrid,
+    PhotonCounts,
+    Views,
+    depth_of_total_disparity_mm,
+    parallax_per_total,
+    total_disparity_px,
+)
 
 # What limits the work. More is slower; fewer cells place depths less exactly.
 MAX_CAMERAS = 5

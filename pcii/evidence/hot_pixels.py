@@ -10,8 +10,7 @@ import warnings
 
 import numpy as np
 
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import FocalPlanes, PhotonCounts
 
 RATIO, EXCESS = 2.0, 5.0
 """A hot pixel has more than twice the photons of its brightest neighbour plus 5, in most views. By Poisson

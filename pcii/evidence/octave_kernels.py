@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
+from pcii.base import compiled, helper
 
 
 @compiled
@@ -69,10 +69,7 @@ def doubled(coarse: np.ndarray, h: int, w: int) -> np.ndarray:
 
 @compiled
 def octave_evidence(
-    finer: tuple[np.ndarray, ...],
-    coarser: tuple[np.ndarray, ...],
-    spread: np.ndarray,
-    constants: np.ndarray,
+    finer: tuple[np.ndarray, ...], coarser: tuple[np.ndarray, ...], spread: np.ndarray, constants: np.ndarray
 ) -> np.ndarray:
     """The e (h, w) float32 of coefficients, the difference of two means of blocks.
 

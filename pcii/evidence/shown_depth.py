@@ -18,12 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pcii.base.blocks import block_sums, on_pixels, window_sums
+from pcii.base import block_sums, on_pixels, window_sums
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import parallax_per_total
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import FocalPlanes, PhotonCounts, Views, parallax_per_total
 
 
 @dataclass(frozen=True)
@@ -130,6 +127,6 @@ def _evidence_at(
 
 def _in_windows(nats: np.ndarray, sigma: float) -> np.ndarray:
     """Sums (Z, h, w) in the window around each cell."""
-    from pcii.base.compiled_loops import each_in_threads
+    from pcii.base import each_in_threads
 
     return np.stack(each_in_threads(lambda z: window_sums(nats[z], sigma), range(len(nats))))

@@ -30,11 +30,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.blocks import block_sums, sum_of
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views, binary_scale
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import block_sums, sum_of
+from pcii.sections import reconstruct
+from pcii.types import FocalPlanes, PhotonCounts, Views, binary_scale
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ def evidence_of_texture(
     The sum over a window is the logarithm, but for a constant, of how likely its samples are if the surface
     is at this plane. A mosaic has all colours in a block of 2 pixels or more, for any shift.
     """
-    from pcii.base.compiled_loops import each_in_threads
+    from pcii.base import each_in_threads
     from pcii.evidence.octave_kernels import add_saturated
 
     planes = replace(planes, rounding=ROUNDING)

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
+from pcii.base import InputError, visible
 from pcii.exchange.pixel_files import LARGEST_BYTES, name_other_file
 
 HDF5_START = b"\x89HDF\r\n\x1a\n"

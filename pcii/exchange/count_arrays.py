@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base import InputError, Report, silent
 from pcii.exchange.array_files import open_array
 from pcii.exchange.frame_formats import (
     AS_COUNTED,
@@ -24,10 +23,7 @@ from pcii.exchange.frame_stacks import FrameFiles, FrameStack, ViewTable, stacks
 from pcii.exchange.image_folders import views_of
 from pcii.exchange.pixel_files import Encoding, to_radiance
 from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
-from pcii.types.bayer import mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, PhotonCounts, Views, mosaic
 
 PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.exchange.array_files import open_array
 from pcii.exchange.pixel_files import decode, kind_of, picture_of
 from pcii.exchange.stated_cameras import Note
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.truth import Truth
+from pcii.types import CameraGrid, Truth
 
 DEPTH_PICTURES = ("PNG", "TIFF", "EXR", "PFM")
 """Kinds of pictures that keep depth."""

@@ -23,10 +23,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from cyclopts import Parameter
 
-from pcii.base.command_line import say
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, Stages, silent
-from pcii.base.safe_files import json_bytes, named_in_errors, new_folder_safely
+from pcii.base import InputError, Report, Stages, json_bytes, named_in_errors, new_folder_safely, say, silent
 from pcii.exchange.export_pictures import (
     TRANSFORMS,
     frames_of,
@@ -36,12 +33,8 @@ from pcii.exchange.export_pictures import (
     write_nerfstudio,
 )
 from pcii.exchange.hci_scenes import write_hci
-from pcii.store.collection import COLUMNS, Collection, is_collection, open_collection
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.folders import check_free
-from pcii.types.photon_counts import FrameEvents
-from pcii.types.photon_limit import Light
-from pcii.types.truth import OPTIONAL_MAPS, Truth
+from pcii.store import COLUMNS, Collection, Dataset, check_free, is_collection, open_collection, open_dataset
+from pcii.types import OPTIONAL_MAPS, FrameEvents, Light, Truth
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events", "webdataset"]
 ARCHIVE = "events.npz"

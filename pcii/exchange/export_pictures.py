@@ -18,13 +18,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pcii.base.plain_text import visible
-from pcii.base.safe_files import json_bytes
-from pcii.figures.pictures import to_srgb8
-from pcii.sections.demosaicing import demosaic
-from pcii.store.dataset import Dataset
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
+from pcii.base import json_bytes, visible
+from pcii.figures import to_srgb8
+from pcii.sections import demosaic
+from pcii.store import Dataset
+from pcii.types import CameraGrid, Views
 
 UP_AND_BACK = np.diag([1.0, -1.0, -1.0])
 """Turns Y down, Z forward into Y up, Z backward; its own inverse, of determinant 1."""

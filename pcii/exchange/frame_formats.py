@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.exchange.array_files import open_array
 from pcii.exchange.pixel_files import decode, kind_of, picture_of
 from pcii.exchange.stated_cameras import Note
-from pcii.types.arrays import whole_counts
+from pcii.types import whole_counts
 
 BitOrder = Literal["big", "little"]
 MOST_BITS = 16

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.exchange.array_files import open_array
 from pcii.exchange.frame_formats import EXACT, FrameFormat
 from pcii.exchange.image_folders import files_by_camera, is_picture, pages_of

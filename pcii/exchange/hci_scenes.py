@@ -20,17 +20,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
-from pcii.base.progress import Report, silent
+from pcii.base import InputError, Report, silent, visible
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
 from pcii.exchange.export_pictures import pictures_of, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
 from pcii.exchange.stated_cameras import Note, Optics, warn
-from pcii.store.dataset import Dataset
-from pcii.store.folders import read_small
-from pcii.types.truth import Truth
+from pcii.store import Dataset, read_small
+from pcii.types import Truth
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"

@@ -12,22 +12,10 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
-from pcii.base.progress import Report, silent
-from pcii.exchange.pixel_files import (
-    Encoding,
-    Picture,
-    decode,
-    kind_of,
-    picture_of,
-    radiance_of,
-)
+from pcii.base import InputError, Report, silent, visible
+from pcii.exchange.pixel_files import Encoding, Picture, decode, kind_of, picture_of, radiance_of
 from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
-from pcii.types.bayer import mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.truth import Truth
+from pcii.types import CameraGrid, Truth, Views, mosaic
 
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
 """Kinds of pictures of views."""

@@ -10,8 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report
+from pcii.base import InputError, Report
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.frame_formats import FrameFormat
 from pcii.exchange.hci_scenes import PARAMETERS, import_hci
@@ -27,9 +26,7 @@ from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.posed_views import import_posed_cubes, import_posed_pictures
 from pcii.exchange.stated_cameras import Note, Optics, ViewOrder
 from pcii.exchange.transforms_file import read_transforms, transforms_in
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
+from pcii.types import PhotonCounts, Truth, Views
 
 COLMAP_FILES = ("cameras.bin", "cameras.txt", "sparse/0/cameras.bin", "sparse/0/cameras.txt")
 WholePair = tuple[int, int] | None

@@ -12,9 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
-from pcii.base.srgb import srgb_to_linear
+from pcii.base import InputError, srgb_to_linear, visible
 
 LARGEST_BYTES = 1 << 33
 """Most memory of all views together, and of all pages of a file: 8 GiB."""

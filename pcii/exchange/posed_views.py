@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base import InputError, Report, silent
 from pcii.exchange.array_files import open_array
 from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.export_pictures import MM_PER_M
@@ -19,9 +18,7 @@ from pcii.exchange.image_folders import radiance_of_files, views_of
 from pcii.exchange.pixel_files import Encoding
 from pcii.exchange.stated_cameras import Note, warn
 from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, PhotonCounts, Views
 
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:

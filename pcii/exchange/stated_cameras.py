@@ -9,8 +9,8 @@ from typing import cast
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
+from pcii.base import InputError
+from pcii.types import CameraGrid
 
 Note = Callable[[str], None]
 """Takes a sentence on what is left out or assumed."""

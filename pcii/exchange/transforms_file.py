@@ -16,13 +16,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
+from pcii.base import InputError, visible
 from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
 from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
 from pcii.exchange.stated_cameras import Note, warn
-from pcii.store.folders import LARGEST_DOCUMENT_BYTES, read_small
+from pcii.store import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
 """What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""

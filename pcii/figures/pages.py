@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.plain_text import in_markdown, visible
+from pcii.base import in_markdown, visible
 
 if TYPE_CHECKING:
     from markupsafe import Markup

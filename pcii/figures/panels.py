@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
+from pcii.base import InputError, visible
 from pcii.figures.pictures import uri_of
 
 if TYPE_CHECKING:
@@ -59,11 +58,7 @@ def in_style(style: str) -> AbstractContextManager[None]:
     return context("default" if style == "paper" else {})
 
 
-def several_axes(
-    axes: "MaybeAxes",
-    count: int,
-    shape: Sequence[float] = (3.0, 4.0),
-) -> np.ndarray:
+def several_axes(axes: "MaybeAxes", count: int, shape: Sequence[float] = (3.0, 4.0)) -> np.ndarray:
     """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those of `axes`, or new.
 
     One panel's axes need no list. Raises `InputError` if the number of axes is not `count`, and for anything

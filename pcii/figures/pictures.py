@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.blocks import block_sums
-from pcii.base.safe_files import write_bytes_safely
-from pcii.base.srgb import linear_to_srgb
+from pcii.base import block_sums, linear_to_srgb, write_bytes_safely
 
 DEPTH_COLOURS, ERROR_COLOURS, SHARE_COLOURS = "viridis_r", "RdBu_r", "magma"
 """Colour maps of Matplotlib: depth, near is bright; signed errors; confidence, more is bright."""

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.base.blocks import evenly_chosen
-from pcii.base.errors import InputError
-from pcii.base.plain_text import in_html
+from pcii.base import InputError, evenly_chosen, in_html
 from pcii.figures.panels import (
     COLOURS,
     GRID_COLOUR,
@@ -212,11 +210,7 @@ def _draw_objects(axes: "Axes", truth: Any) -> None:
 
 
 def _show_picture(
-    axes: "Axes",
-    image: np.ndarray,
-    shape_HW: Sequence[int],
-    title: str,
-    block_px: float = 1.0,
+    axes: "Axes", image: np.ndarray, shape_HW: Sequence[int], title: str, block_px: float = 1.0
 ) -> None:
     """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
 

@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, TrueFocus
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import blur_half_extent_px, parallax_per_total, total_disparity_px
-from pcii.types.section_stack import Sections
-from pcii.types.truth import Truth
+from pcii.types import (
+    CameraGrid,
+    Sections,
+    Truth,
+    blur_half_extent_px,
+    parallax_per_total,
+    total_disparity_px,
+)
 
 TEXTURE_SIGMA_PX = 0.5
 """Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels

@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap
-from pcii.types.geometry import parallax_px, total_disparity_px
-from pcii.types.truth import Truth
+from pcii.base import InputError
+from pcii.types import CameraGrid, DepthMap, Truth, parallax_px, total_disparity_px
 
 MEASURES = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px", "bias_mm")
 MEASURES += ("bias_px", "within_1px", "within_3px", "brier", "quadratic_score")

@@ -6,21 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.metrics.bounds import object_bounds
 from pcii.metrics.depth_accuracy import depth_errors
 from pcii.metrics.true_masks import KINDS, TrueFocus, mask_agreement, photon_agreement
-from pcii.sections.photon_statistics import (
-    entropy_bits,
-    pooled_estimate,
-    region_entropy_bits,
-    section_window_px,
-)
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.estimates import DepthMap, Score, Segmented
-from pcii.types.geometry import blur_half_extent_px
-from pcii.types.section_stack import Sections
-from pcii.types.truth import Truth
+from pcii.sections import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
+from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, blur_half_extent_px
 
 
 def score(

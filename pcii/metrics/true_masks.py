@@ -6,11 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.estimates import Segmented
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import blur_half_extent_px
-from pcii.types.truth import PhotonTruth, Truth
+from pcii.base import InputError
+from pcii.types import FocalPlanes, PhotonTruth, Segmented, Truth, blur_half_extent_px
 
 FOCUS_TOLERANCE_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""

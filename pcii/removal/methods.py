@@ -19,18 +19,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from pcii.base.blocks import on_pixels
-from pcii.base.errors import InputError
-from pcii.base.extensions import MethodRegistry, called
-from pcii.depth.methods import check_range_mm, check_search
-from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.removal.three_step.three_step_method import ThreeStep
-from pcii.sections.photon_statistics import warn_of_saturation
-from pcii.sections.reconstruction import reconstruct
-from pcii.types.estimates import DepthMap, DepthPosterior, Segmented
-from pcii.types.focal_planes import check_depth_counts
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.base import InputError, MethodRegistry, called, on_pixels
+from pcii.depth import PosteriorDepth, check_range_mm, check_search
+from pcii.removal.three_step import ThreeStep
+from pcii.sections import reconstruct, warn_of_saturation
+from pcii.types import DepthMap, DepthPosterior, PhotonCounts, Sections, Segmented, check_depth_counts
 
 GROUP = "pcii.methods"
 Method = Callable[[PhotonCounts, Sections], Segmented]

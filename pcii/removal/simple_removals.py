@@ -7,13 +7,10 @@ of the photons in a window, whose noise does not depend on the brightness (see
 
 import numpy as np
 
-from pcii.removal.three_step.bright_regions import SMALLEST_REGION_PX, without_specks
-from pcii.removal.three_step.bright_regions import brightness as root_photons
-from pcii.sections.photon_statistics import pooled_estimate, section_window_px
-from pcii.sections.reconstruction import extend, with_probes
-from pcii.types.estimates import Segmented
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.removal.three_step import SMALLEST_REGION_PX, without_specks
+from pcii.removal.three_step import brightness as root_photons
+from pcii.sections import extend, pooled_estimate, section_window_px, with_probes
+from pcii.types import PhotonCounts, Sections, Segmented
 
 NOISE = 0.5
 """Standard deviation of the square root of a Poisson count."""

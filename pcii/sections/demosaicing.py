@@ -7,8 +7,8 @@ one. The code distinguishes sites, not patterns, so it serves all four Bayer pat
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import check_cfa, colour_cells
+from pcii.base import InputError
+from pcii.types import check_cfa, colour_cells
 
 METHOD = "laroche-prescott"
 

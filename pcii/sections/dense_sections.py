@@ -15,12 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import colour_cells
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Shifts
+from pcii.base import InputError
+from pcii.types import FocalPlanes, PhotonCounts, Shifts, Views, colour_cells
 
 BATCH = 8
 """Views that are read from disk at a time; as many are added meanwhile."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.compiled_loops import helper, shared, threads
+from pcii.base import helper, shared, threads
 
 BAND = 16
 """Rows of a section that images are added to at a time: their sums stay in the cache."""

@@ -16,13 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.base.blocks import sum_of
-from pcii.types.bayer import colour_index
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.readout import NEGLIGIBLE_LOSS, Readout
-from pcii.types.section_stack import Sections
+from pcii.base import sum_of
+from pcii.types import NEGLIGIBLE_LOSS, FocalPlanes, PhotonCounts, Readout, Sections, Views, colour_index
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
@@ -159,7 +154,7 @@ def view_samples(
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
     """
-    from pcii.base.compiled_loops import threads
+    from pcii.base import threads
     from pcii.sections import kernels
 
     grid, events = counts.grid, counts.events

@@ -10,15 +10,20 @@ from functools import partial
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
-from pcii.types.arrays import LARGEST_COUNT, is_whole
-from pcii.types.bayer import colour_cells
-from pcii.types.focal_planes import FocalPlanes, check_data
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.readout import PLAIN
-from pcii.types.section_stack import Sections, Shifts
+from pcii.types import (
+    LARGEST_COUNT,
+    PLAIN,
+    FocalPlanes,
+    PhotonCounts,
+    Sections,
+    Shifts,
+    Views,
+    check_data,
+    colour_cells,
+    is_whole,
+)
 
 DENSE_SHARE = 1 / 16
 """If a larger share of the pixels has photons, adding whole images takes less time than adding each photon.
@@ -145,11 +150,7 @@ def _as_images(counts: PhotonCounts) -> bool:
 
 
 def _scatter(
-    data: PhotonCounts,
-    n: np.ndarray,
-    shape: tuple[int, ...],
-    rows: np.ndarray,
-    cols: np.ndarray,
+    data: PhotonCounts, n: np.ndarray, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:
     """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
     from pcii.sections import kernels

@@ -15,9 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
-from pcii.base.short_form import ShortForm, listed
+from pcii.base import InputError, ShortForm, listed, write_bytes_safely
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import MANIFEST
 from pcii.store.folders import FolderKind, hash_bytes, hash_file

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import new_folder_safely
-from pcii.base.short_form import ShortForm, listed, times
+from pcii.base import InputError, ShortForm, listed, new_folder_safely, times
 from pcii.store.dataset_layout import (
     ARRAYS,
     COUNTS,
@@ -28,12 +26,21 @@ from pcii.store.dataset_layout import (
 )
 from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
 from pcii.store.zarr_groups import read_array
-from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import EXPOSURE, FULL_LIGHT, Light
-from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.types import (
+    COUNTS_LABELS,
+    EXPOSURE,
+    FULL_LIGHT,
+    OPTIONAL_MAPS,
+    PHOTON_TRUTH_LABELS,
+    TRUTH_LABELS,
+    CameraGrid,
+    Label,
+    Light,
+    PhotonCounts,
+    PhotonTruth,
+    Truth,
+    Views,
+)
 
 if TYPE_CHECKING:
     from pcii.store.manifests import DatasetManifest

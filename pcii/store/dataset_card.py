@@ -7,8 +7,7 @@ LICENSE has the terms alone, where programs that collect data look for them.
 from dataclasses import dataclass
 from pathlib import Path
 
-from pcii.base.plain_text import in_markdown, visible, web_address
-from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
+from pcii.base import in_markdown, locked, temporaries_of, visible, web_address, write_bytes_safely
 from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
 from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.dataset_layout import LICENCE as LICENCE_FILE

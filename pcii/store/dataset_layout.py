@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
+from pcii.base import InputError, write_bytes_safely
 from pcii.store.folders import REMEDY, FolderKind
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import named_in_errors, new_folder_safely
+from pcii.base import InputError, named_in_errors, new_folder_safely
 from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.dataset_layout import (
     COUNTS,
@@ -23,11 +22,17 @@ from pcii.store.dataset_layout import (
 from pcii.store.folders import check_free, hash_json, list_files
 from pcii.store.software import PACKAGE, versions
 from pcii.store.zarr_groups import DTYPES, write_arrays_safely
-from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
-from pcii.types.arrays import check_z_mm
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.types import (
+    COUNTS_LABELS,
+    OPTIONAL_MAPS,
+    PHOTON_TRUTH_LABELS,
+    TRUTH_LABELS,
+    PhotonCounts,
+    PhotonTruth,
+    Truth,
+    Views,
+    check_z_mm,
+)
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import json_bytes, write_bytes_safely
+from pcii.base import InputError, json_bytes, write_bytes_safely
 
 if TYPE_CHECKING:
     from pcii.store.manifests import EvaluationManifest, Manifest, ResultsManifest

@@ -19,13 +19,8 @@ from pydantic import (
 )
 from typing_extensions import TypedDict  # pydantic takes that of the standard library from Python 3.12 on
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
-from pcii.types.arrays import MOST_DEPTHS
-from pcii.types.bayer import check_cfa
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_limit import MOST_PHOTONS, Scope
-from pcii.types.readout import MOST_BITS, MOST_FRAMES
+from pcii.base import InputError, visible
+from pcii.types import MOST_BITS, MOST_DEPTHS, MOST_FRAMES, MOST_PHOTONS, CameraGrid, Scope, check_cfa
 
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 

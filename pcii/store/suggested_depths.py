@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.store.dataset import Dataset
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.geometry import disparity_px
+from pcii.types import CameraGrid, FocalPlanes, disparity_px
 
 
 def has_depths(dataset: Dataset, z_mm: Sequence[float] | None = None) -> bool:

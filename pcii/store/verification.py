@@ -3,9 +3,7 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from pcii.base.command_line import answer_json, say
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, Stages, silent
+from pcii.base import InputError, Report, Stages, answer_json, say, silent
 from pcii.store.collection import (
     CERTIFICATE,
     COLLECTION,

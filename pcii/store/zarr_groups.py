@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
-from pcii.base.safe_files import new_folder_safely
+from pcii.base import InputError, new_folder_safely, visible
 from pcii.store.folders import REMEDY
-from pcii.types.array_labels import Label
+from pcii.types import Label
 
 CHUNK_ELEMENTS = 1 << 20
 """One chunk is at most this many elements: a view, or a million events."""

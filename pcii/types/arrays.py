@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm
+from pcii.base import InputError, ShortForm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,12 +43,12 @@ class Plottable(ShortForm):
 
         Raises `InputError` for what are no axes, another number of them, and no camera of the grid.
         """
-        from pcii.figures.plots import draw
+        from pcii.figures import draw
 
         return draw(self, axes, **options)
 
     def _repr_html_(self) -> str:
-        from pcii.figures.plots import picture_html
+        from pcii.figures import picture_html
 
         return picture_html(self)
 

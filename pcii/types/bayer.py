@@ -6,7 +6,7 @@ A pattern is named by its first two rows, read left to right, top to bottom: in 
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 
 COLOURS = "RGB"
 PATTERNS = ("GRBG", "RGGB", "BGGR", "GBRG")

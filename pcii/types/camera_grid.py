@@ -6,7 +6,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.types.arrays import is_whole
 
 

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, listed, span, times
+from pcii.base import InputError, ShortForm, listed, span, times
 from pcii.types.arrays import Plottable, read_only
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.section_stack import Sections

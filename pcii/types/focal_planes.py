@@ -10,15 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, listed
+from pcii.base import InputError, ShortForm, listed
 from pcii.types.arrays import check_z_mm, read_only
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import (
-    depth_of_total_disparity_mm,
-    disparity_px,
-    total_disparity_px,
-)
+from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts, PhotonEvents
 from pcii.types.truth import PhotonTruth

@@ -5,8 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import times
+from pcii.base import InputError, times
 from pcii.types.arrays import Plottable, read_only
 from pcii.types.bayer import check_cfa, colours_and_samples
 from pcii.types.camera_grid import CameraGrid

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
+from pcii.base import InputError, ShortForm, times
 from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
 from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid

@@ -9,8 +9,7 @@ from typing import Literal, Self
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE
+from pcii.base import LUMINANCE, InputError
 from pcii.types.arrays import is_whole
 from pcii.types.bayer import channel_count, colour_index, mosaic
 from pcii.types.images import Views

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import listed, times
+from pcii.base import InputError, listed, times
 from pcii.types.arrays import Plottable, read_only
 from pcii.types.bayer import by_colour, check_cfa
 from pcii.types.camera_grid import CameraGrid

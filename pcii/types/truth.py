@@ -6,8 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.short_form import listed, span, times
+from pcii.base import InputError, listed, span, times
 from pcii.types.arrays import Plottable, read_only
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")

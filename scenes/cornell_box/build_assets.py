@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simgen.assets.asset_files import ply_bytes
-from simgen.assets.triangles import Triangles
+from simgen.assets import Triangles, ply_bytes
 
 Quad = list[tuple[float, float, float]]
 SHORT: list[Quad] = [

@@ -11,7 +11,7 @@ from gltf_draft import QUAD, QUAD_FACES, QUAD_UV, GltfDraft
 from PIL import Image
 
 import simgen
-from simgen.base.strict_models import toml_text
+from simgen.base import toml_text
 
 SECTORS = 32
 Lathe = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -5,12 +5,19 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from pcii.base import command_line
-from pcii.base.command_line import answer_json, complain_of, results_folder, say, say_next
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Stages
-from pcii.exchange.export_formats import export
-from pcii.store.collection import Half
+from pcii.base import (
+    THIS_PROCESS,
+    Executor,
+    Stages,
+    answer_json,
+    command_line,
+    complain_of,
+    results_folder,
+    say,
+    say_next,
+)
+from pcii.exchange import export
+from pcii.store import Half
 from simgen.app.scene_commands import (
     Json,
     Out,
@@ -115,8 +122,7 @@ def generate(
     from simgen.app.library import generate as generate_dataset
     from simgen.app.library import generate_sweep
     from simgen.renderer import backend
-    from simgen.spec.recipe_files import RecipeFile
-    from simgen.spec.sweeps import load_sweep
+    from simgen.spec import RecipeFile, load_sweep
 
     sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes, trust_python=trust_python)
     say(f"backend: {backend.choose().line()}")
@@ -168,7 +174,7 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from simgen.dataset.benchmark_making import CERTIFICATE, certify, load_definition, make_benchmark
+    from simgen.dataset import CERTIFICATE, certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)
@@ -224,7 +230,7 @@ def verify(dataset: Path, *, json: Json = False) -> None:
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
     """
-    from pcii.store.verification import print_verification
+    from pcii.store import print_verification
 
     print_verification(dataset, as_json=json)
 

@@ -8,27 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.images import Views
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import sense
-from pcii.types.truth import PhotonTruth, Truth
-from simgen.base.strict_models import validate
-from simgen.cameras.rig import centre_camera
-from simgen.dataset.photon_counts import draw_from_views
-from simgen.dataset.prepared import Prepared, prepare_scene
-from simgen.dataset.rendered_views import exact_view, halved_view
-from simgen.dataset.resources import available_bytes, check_resources, in_bytes
-from simgen.photons.capture import Capture
-from simgen.photons.exploration import Plan
-from simgen.photons.thinning import thin_photons
-from simgen.sensor.detector import counts_of, detect, read_out
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import CalibrationErrors, Lens, Recipe, Sensor
-from simgen.spec.scene import Scene
-from simgen.truth.first_hits import coverage, first_hits_at_centre
+from pcii.base import InputError, Report, silent
+from pcii.types import CameraGrid, PhotonCounts, PhotonTruth, Truth, Views, sense
+from simgen.base import validate
+from simgen.cameras import centre_camera
+from simgen.dataset import (
+    Prepared,
+    available_bytes,
+    check_resources,
+    draw_from_views,
+    exact_view,
+    halved_view,
+    in_bytes,
+    prepare_scene,
+)
+from simgen.photons import Capture, Plan, thin_photons
+from simgen.sensor import PhotonTable, counts_of, detect, read_out
+from simgen.spec import CalibrationErrors, Lens, Recipe, Scene, Sensor
+from simgen.truth import coverage, first_hits_at_centre
 
 Values = Mapping[str, Any]
 """A table of a recipe as a dict."""

@@ -4,20 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Report, silent
-from pcii.store.collection import Collection, open_collection
-from pcii.store.dataset_card import write_card
-from pcii.store.manifests import DatasetManifest
+from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent
+from pcii.store import Collection, DatasetManifest, open_collection, write_card
 from simgen.app.pictures import Preview, check_picture_path, draw_preview
-from simgen.check.targets import load_target
+from simgen.check import load_target
 from simgen.dataset import dataset_collection as collections
 from simgen.dataset import generation
-from simgen.spec import scene_lookup
-from simgen.spec.recipe_files import RecipeFile
-from simgen.spec.scene import Scene, scene_of
-from simgen.spec.sweeps import Sweep, load_sweep
+from simgen.spec import RecipeFile, Scene, Sweep, load_sweep, scene_lookup, scene_of
 
 
 def load_scene(

@@ -10,22 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pcii.base.blocks import evenly_chosen
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
-from pcii.figures.panels import hide_frame, new_figure
-from pcii.figures.pictures import block_px, exposed, to_srgb8, white_level
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.dataset_layout import COUNTS
-from pcii.types.bayer import colours_and_samples
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.truth import Truth
-from simgen.cameras.rig import coarser
-from simgen.dataset.prepared import Prepared
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
-from simgen.renderer.radiance import render_view
-from simgen.truth.first_hits import first_hits_at_centre
+from pcii.base import InputError, evenly_chosen, write_bytes_safely
+from pcii.figures import block_px, exposed, hide_frame, new_figure, to_srgb8, white_level
+from pcii.store import COUNTS, Dataset, open_dataset
+from pcii.types import PhotonCounts, Truth, colours_and_samples
+from simgen.cameras import coarser
+from simgen.dataset import Prepared
+from simgen.renderer import backend, build, render_view
+from simgen.truth import first_hits_at_centre
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base.command_line import answer_json, say, say_next
+from pcii.base import answer_json, say, say_next
 
 Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
@@ -32,7 +32,7 @@ def scenes() -> None:
         simgen scenes
     """
     from simgen.app.starting_points import list_recipes, list_scenes
-    from simgen.base.rendering_packages import check_installed
+    from simgen.base import check_installed
 
     check_installed()  # or else some scenes would be listed as not valid
     for line in (*list_scenes(), "", "Recipes, of which `simgen generate` makes datasets:", *list_recipes()):
@@ -53,9 +53,8 @@ def schema(what: Literal["scene", "recipe"]) -> None:
     what
         Which kind of file.
     """
-    from simgen.base.strict_models import schema_of
-    from simgen.spec.recipe import Recipe
-    from simgen.spec.scene import Scene
+    from simgen.base import schema_of
+    from simgen.spec import Recipe, Scene
 
     answer_json(schema_of(Scene if what == "scene" else Recipe))
 
@@ -87,7 +86,7 @@ def check(
     scene
         Which scene of those that a Python function draws; the first unless you say.
     """
-    from simgen.check.targets import lint
+    from simgen.check import lint
 
     line, findings = lint(target, set, scene, trust_python=trust_python)
     bad, warnings = (sum(one.verdict == verdict for one in findings) for verdict in ("bad", "warn"))
@@ -136,7 +135,7 @@ def preview(
         Light paths per pixel; more is slower and less noisy.
     """
     from simgen.app.library import preview
-    from simgen.spec.scene_lookup import is_scene
+    from simgen.spec import is_scene
 
     preview(target, out, samples_per_pixel, scene, overrides=set, trust_python=trust_python)
     say(f"{out}")
@@ -236,7 +235,7 @@ def import_scene(
     unscored
         Name of an object that counts in no score, such as a table or a floor; may be repeated.
     """
-    from simgen.importing.scene_import import import_scene
+    from simgen.importing import import_scene
 
     place = {"camera": camera, "unit": unit, "up": up, "place_at_mm": place_at_mm, "fit_mm": fit_mm}
     for line in import_scene(file, out, **place, emission_unit=emission_unit, unscored=unscored).lines():

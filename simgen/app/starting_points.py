@@ -9,13 +9,19 @@ from collections.abc import Callable
 from pathlib import Path
 from string import Template
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import new_folder_safely, write_bytes_safely
-from simgen.base.strict_models import shorten
-from simgen.spec.recipe_files import recipe_file, recipe_names
-from simgen.spec.scene import NAME
-from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
-from simgen.spec.sweeps import load_sweep
+from pcii.base import InputError, new_folder_safely, write_bytes_safely
+from simgen.base import shorten
+from simgen.spec import (
+    NAME,
+    drawn_scenes,
+    is_drawn,
+    is_scene,
+    load_scene,
+    load_sweep,
+    recipe_file,
+    recipe_names,
+    scene_names,
+)
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 

@@ -15,13 +15,19 @@ import numpy as np
 from numpy.lib.recfunctions import unstructured_to_structured
 from pydantic import BaseModel
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import srgb_to_linear
-from pcii.exchange.pixel_files import UPRIGHT, decode, picture_of
+from pcii.base import InputError, srgb_to_linear
+from pcii.exchange import UPRIGHT, decode, picture_of
 from simgen.assets.triangles import Triangles, triangulate
-from simgen.base.file_lookup import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
-from simgen.base.rendering_packages import not_installed
-from simgen.base.strict_models import shorten
+from simgen.base import (
+    AssetName,
+    EnvironmentName,
+    ImageName,
+    MeshName,
+    asset,
+    named_files,
+    not_installed,
+    shorten,
+)
 
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _FACES = ("vertex_indices", "vertex_index")

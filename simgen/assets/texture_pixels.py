@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.srgb import srgb_to_linear
-from simgen.spec.materials import Checks, Edge, Noise, Star, Stripes, Text, Texture
+from pcii.base import srgb_to_linear
+from simgen.spec import Checks, Edge, Noise, Star, Stripes, Text, Texture
 
 NEGLIGIBLE_CYCLES = 1e-8
 """A wave that changes by less across a pixel is taken as constant that way; see `square_wave`."""

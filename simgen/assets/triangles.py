@@ -10,9 +10,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.base.strict_models import LARGEST_MM
-from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
+from pcii.base import InputError
+from simgen.base import LARGEST_MM
+from simgen.spec import Box, Card, Cylinder, Mesh, Shape, Sphere
 
 MOST_VERTICES = 1 << 22
 MOST_FACES = 1 << 22

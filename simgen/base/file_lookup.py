@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_json_safely
+from pcii.base import InputError, write_json_safely
 
 LONGEST_NAME = 200
 LARGEST_FILE_BYTES = 1 << 28

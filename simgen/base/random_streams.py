@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from pcii.store.folders import hash_json
+from pcii.store import hash_json
 
 Stage = Literal[
     "radiance",

@@ -3,7 +3,7 @@
 import importlib.util
 from collections.abc import Sequence
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 
 MODULES = {"mitsuba": "mitsuba", "drjit": "drjit", "colour": "colour-science", "plyfile": "plyfile"}
 """The modules of the extra `render`, and the packages that they are of."""

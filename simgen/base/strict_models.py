@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80

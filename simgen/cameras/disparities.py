@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pcii.types.bayer import channel_count, colour_cells
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid, channel_count, colour_cells
 
 MAX_PITCH_CHANGE = 0.25
 """Another pitch differs from the present one by at most this share."""

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 from simgen.base import random_streams as seeds
-from simgen.spec.recipe import Grid, Lens
+from simgen.spec import Grid, Lens
 
 
 def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pcii.types.bayer import COLOURS
-from simgen.cameras.disparities import (
+from pcii.types import COLOURS
+from simgen.cameras import (
     apart_px,
     disparities_px,
     mending_pitch_mm,

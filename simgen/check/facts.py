@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.disparities import apart_px
-from simgen.dataset.prepared import Prepared
-from simgen.photons.exploration import Plan
+from pcii.types import CameraGrid
+from simgen.cameras import apart_px
+from simgen.dataset import Prepared
+from simgen.photons import Plan
 
 MAX_PLANE_BLUR_PX = 2.0
 """Where a recipe names no planes, objects within this blur share one."""

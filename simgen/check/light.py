@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 
-from pcii.types.bayer import channel_count
-from pcii.types.readout import NEGLIGIBLE_LOSS, clipped_mean
+from pcii.types import NEGLIGIBLE_LOSS, channel_count, clipped_mean
 from simgen.check.facts import Facts, Finding, ObjectFacts
-from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes, shortage
-from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+from simgen.dataset import in_bytes, peak_bytes, product_bytes, shortage
+from simgen.photons import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
 MIN_PHOTONS = 100
 """Fewest photons, over all views, that show an object."""

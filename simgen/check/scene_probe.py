@@ -8,20 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from pcii.types.bayer import channel_count, colour_cells
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_limit import sense
+from pcii.types import CameraGrid, channel_count, colour_cells, sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import coarser, corners
+from simgen.cameras import coarser, corners
 from simgen.check.facts import Facts, ObjectFacts
-from simgen.dataset.prepared import Prepared
-from simgen.dataset.resources import available_bytes
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.renderer.radiance import render_view
-from simgen.spec.lights import AreaLight, EnvironmentLight, SpotLight, UniformLight
-from simgen.spec.scene import Scene
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
+from simgen.dataset import Prepared, available_bytes
+from simgen.renderer import RenderScene, backend, render_view
+from simgen.spec import AreaLight, EnvironmentLight, Scene, SpotLight, UniformLight
+from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""

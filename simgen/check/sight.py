@@ -1,7 +1,7 @@
 """Findings on what the cameras see: objects that are cut or never seen, lamps, glass."""
 
 from simgen.check.facts import Facts, Finding, ObjectFacts, listed
-from simgen.spec.materials import is_clear
+from simgen.spec import is_clear
 
 MAX_MAGNIFICATION = 10.0
 """What stands nearer than the focal length divided by this is taken to be placed by mistake, as in metres."""

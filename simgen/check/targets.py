@@ -4,21 +4,28 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pcii.base.errors import InputError
-from simgen.base.strict_models import suggestion
+from pcii.base import InputError
+from simgen.base import suggestion
 from simgen.check.depths import depth_findings
 from simgen.check.facts import Facts, Finding
 from simgen.check.light import cost_findings, photon_findings
 from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
-from simgen.dataset.prepared import Prepared, prepare, prepare_scene
-from simgen.dataset.resources import available_bytes, shortage
-from simgen.spec.materials import is_clear
-from simgen.spec.recipe import Recipe, Render
-from simgen.spec.recipe_files import recipe_file, recipe_names
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, scene_names
-from simgen.spec.sweeps import Sweep, load_sweep
+from simgen.dataset import Prepared, available_bytes, prepare, prepare_scene, shortage
+from simgen.spec import (
+    Recipe,
+    Render,
+    Scene,
+    Sweep,
+    drawn_scenes,
+    is_clear,
+    is_drawn,
+    is_scene,
+    load_sweep,
+    recipe_file,
+    recipe_names,
+    scene_names,
+)
 
 GLASS_DEPTH = 8
 """Longest light path with which a scene with glass is looked at: through a ball or a pane and back."""

@@ -17,29 +17,25 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
-from pcii.base.errors import InputError
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Report, silent
-from pcii.base.safe_files import write_json_safely
-from pcii.store.collection import (
+from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent, write_json_safely
+from pcii.store import (
     BENCHMARK_FIELDS,
     CERTIFICATE,
     IN_FRAMES,
+    Dataset,
     Half,
+    hash_json,
     open_collection,
     read_index,
+    write_card,
+    write_licence,
 )
-from pcii.store.dataset import Dataset
-from pcii.store.dataset_card import write_card, write_licence
-from pcii.store.folders import hash_json
-from simgen.base.file_lookup import find_all
-from simgen.base.strict_models import read_toml, suggestion, validate
+from simgen.base import find_all, read_toml, suggestion, validate
 from simgen.dataset.croissant_file import write_croissant
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions
 from simgen.renderer import backend
-from simgen.spec.recipe import Publication, Recipe
-from simgen.spec.recipe_files import load_recipe
+from simgen.spec import Publication, Recipe, load_recipe
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]

@@ -7,11 +7,8 @@ describe them; their arrays are Zarr, which Croissant has no way to read.
 from pathlib import Path
 from typing import Any
 
-from pcii.base.safe_files import write_json_safely
-from pcii.store.collection import CROISSANT, INDEX
-from pcii.store.dataset_card import Terms
-from pcii.store.dataset_layout import MANIFEST, RADIANCE
-from pcii.store.folders import hash_file
+from pcii.base import write_json_safely
+from pcii.store import CROISSANT, INDEX, MANIFEST, RADIANCE, Terms, hash_file
 
 TERMS = "citeAs", "extract", "field", "fileSet", "includes", "jsonPath", "recordSet", "source"
 CONTEXT: dict[str, Any] = {

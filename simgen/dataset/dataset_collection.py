@@ -6,27 +6,34 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from pcii.base.errors import InputError
-from pcii.base.executor import THIS_PROCESS, Executor
-from pcii.base.progress import Report, silent
-from pcii.base.safe_files import locked, named_in_errors, temporaries_of
-from pcii.store.collection import (
+from pcii.base import (
+    THIS_PROCESS,
+    Executor,
+    InputError,
+    Report,
+    locked,
+    named_in_errors,
+    silent,
+    temporaries_of,
+)
+from pcii.store import (
     COLLECTION,
     COLLECTION_FOLDER,
     INDEX,
+    LOCK,
+    MANIFEST,
+    MARKER,
     check_manifest,
     index_row,
     read_collection,
     read_index,
     write_index,
 )
-from pcii.store.dataset_layout import MANIFEST, MARKER
-from pcii.store.folders import LOCK
 from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_dataset, other_versions
 from simgen.dataset.generation import Reuse, make
 from simgen.dataset.prepared import prepare
 from simgen.renderer import backend
-from simgen.spec.recipe import Recipe
+from simgen.spec import Recipe
 
 Row = Mapping[str, Any]
 

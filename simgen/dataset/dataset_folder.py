@@ -7,13 +7,17 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import locked
-from pcii.store import software
-from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
-from pcii.store.folders import check_size, read_listed
-from pcii.store.manifests import DatasetManifest
-from pcii.store.software import PACKAGE
+from pcii.base import InputError, locked
+from pcii.store import (
+    DATASET_FOLDER,
+    MARKER,
+    PACKAGE,
+    DatasetManifest,
+    check_size,
+    read_listed,
+    read_written_manifest,
+    software,
+)
 
 DECISIVE = (PACKAGE, "mitsuba")
 """Packages whose versions are part of what identifies a dataset."""

@@ -9,35 +9,31 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pcii.base.progress import Report, silent
-from pcii.base.safe_files import named_in_errors, new_folder_safely, sweep_temporaries
-from pcii.store.dataset_layout import (
+from pcii.base import Report, named_in_errors, new_folder_safely, silent, sweep_temporaries
+from pcii.store import (
     ARRAYS,
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
+    DatasetManifest,
+    list_files,
     nested_name,
     pack_arrays,
     read_written_manifest,
     write_manifest,
 )
-from pcii.store.folders import list_files
-from pcii.store.manifests import DatasetManifest
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.photon_counts import draw_from_views, write_counts
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
 from simgen.dataset.resources import check_resources
-from simgen.photons.capture import Capture
-from simgen.photons.exploration import Plan
-from simgen.photons.thinning import thin_photons
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Recipe
-from simgen.truth.truth_file import traced_for_visibility, write_truth
+from simgen.photons import Capture, Plan, thin_photons
+from simgen.renderer import RenderScene, backend
+from simgen.sensor import PhotonTable
+from simgen.spec import Recipe
+from simgen.truth import traced_for_visibility, write_truth
 
 Made = TypeVar("Made")
 

@@ -7,19 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report
-from pcii.store.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
-from pcii.store.dataset_writer import write_counts as save_counts
-from pcii.store.dataset_writer import write_photon_truth
-from pcii.types.photon_limit import Light, photon_rates, scope_energies
+from pcii.base import InputError, Report
+from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_photon_truth
+from pcii.store import write_counts as save_counts
+from pcii.types import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
-from simgen.photons.capture import Capture, ranks_in_scopes
-from simgen.photons.counting_plan import MAX_NOISE_SHARE
-from simgen.photons.exploration import Plan
-from simgen.sensor import detector
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import MOST_PHOTONS, Sensor
+from simgen.photons import MAX_NOISE_SHARE, Capture, Plan, ranks_in_scopes
+from simgen.sensor import PhotonTable, detector
+from simgen.spec import MOST_PHOTONS, Sensor
 
 
 def draw_from_views(

@@ -9,23 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from pcii.store.dataset_layout import DATASET_FOLDER
-from pcii.store.folders import hash_file, hash_json
-from simgen.assets.asset_files import read_assets
+from pcii.store import DATASET_FOLDER, hash_file, hash_json
+from simgen.assets import read_assets
+from simgen.base import asset
 from simgen.base import random_streams as seeds
-from simgen.base.file_lookup import asset
-from simgen.cameras.rig import rig_of
+from simgen.cameras import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import available_bytes, shortage
-from simgen.photons.capture import Capture
-from simgen.photons.counting_plan import plan_counts
-from simgen.photons.exploration import Plan
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.detector import dark_map, photons_per_radiance, sensitivities
-from simgen.spec.recipe import Analysis, Recipe
-from simgen.spec.scene import Scene, checked_folder, scene_files
-from simgen.spec.scene_lookup import load_scene
+from simgen.photons import Capture, Plan, plan_counts
+from simgen.renderer import RenderScene, backend, build
+from simgen.sensor import dark_map, photons_per_radiance, sensitivities
+from simgen.spec import Analysis, Recipe, Scene, checked_folder, load_scene, scene_files
 
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""

@@ -9,16 +9,14 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.base.progress import Report
-from pcii.base.safe_files import write_json_safely
-from pcii.store.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
-from pcii.types.bayer import channel_count, colour_index
-from pcii.types.photon_limit import sense
+from pcii.base import Report, write_json_safely
+from pcii.store import RADIANCE, radiance_name, read_exr, write_exr_safely
+from pcii.types import channel_count, colour_index, sense
 from simgen.base import random_streams as seeds
-from simgen.photons.capture import Capture
-from simgen.renderer.radiance import render_view, windows_of_objects
-from simgen.sensor.detector import full_light_image, photons_per_radiance
-from simgen.spec.recipe import Exposure, Render, Sensor
+from simgen.photons import Capture
+from simgen.renderer import render_view, windows_of_objects
+from simgen.sensor import full_light_image, photons_per_radiance
+from simgen.spec import Exposure, Render, Sensor
 
 RENDERED = ".rendered"
 """Folder of exact views that are no product in themselves; gone when the dataset is finished."""

@@ -10,11 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.photons.disparity_layers import layers_for, tile_px_for
-from simgen.photons.exploration import Plan
-from simgen.photons.pilot import MAX_RAYS
-from simgen.spec.recipe import Recipe
+from pcii.base import InputError
+from simgen.photons import MAX_RAYS, Plan, layers_for, tile_px_for
+from simgen.spec import Recipe
 
 BASE_BYTES = 4e8
 """The renderer and its libraries."""

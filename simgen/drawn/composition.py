@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from simgen.spec.scene import Scene, scene_of
+from simgen.spec import Scene, scene_of
 
 Table = dict[str, Any]
 """A TOML table."""

@@ -11,8 +11,8 @@ from random import Random
 
 import numpy as np
 
-from pcii.base.safe_files import write_bytes_safely
-from simgen.base.file_lookup import cache_folder
+from pcii.base import write_bytes_safely
+from simgen.base import cache_folder
 from simgen.drawn.composition import Table, log_uniform
 
 ROWS, COLUMNS = 64, 128

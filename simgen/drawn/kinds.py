@@ -12,7 +12,7 @@ from random import Random
 
 from simgen.drawn import composition as draw
 from simgen.drawn.composition import UPRIGHT, Material, Objects, Table, Triple
-from simgen.spec.scene import Scene
+from simgen.spec import Scene
 
 FIRST_UNSEEN = 100
 """The least number of a scene that no method was tuned or trained on."""

@@ -15,7 +15,7 @@ from simgen.drawn import composition as draw
 from simgen.drawn import curved_shapes as curved
 from simgen.drawn import training_parts as parts
 from simgen.drawn.composition import UPRIGHT, Objects, Triple
-from simgen.spec.scene import Scene
+from simgen.spec import Scene
 
 TOTAL_PX_MM = 9 * 5 * 50 / 0.0704
 """Total disparity times depth."""

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.assets.triangles import Triangles
+from pcii.base import InputError
+from simgen.assets import Triangles
 
 UPRIGHT = np.diag([1.0, -1.0, -1.0, 1.0])
 """From X right, Y up, Z towards who looks, as models stand, to X right, Y down, Z forward; and back."""

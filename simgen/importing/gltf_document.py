@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
-from simgen.base.strict_models import LONGEST_PART, Positive, Real, Vector, shorten, shown_value, validate
-from simgen.spec.materials import MOST_INDEX
+from simgen.base import LONGEST_PART, Positive, Real, Vector, shorten, shown_value, validate
+from simgen.spec import MOST_INDEX
 
 UNREAD_VALUES = dict.fromkeys([("wrapS", 33648), ("wrapT", 33648)], "MIRRORED_REPEAT")
 UNREAD_VALUES["magFilter", 9728] = "NEAREST"

@@ -11,12 +11,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.assets.asset_files import read_texture
-from simgen.base.file_lookup import LARGEST_FILE_BYTES, LONGEST_NAME, asset
-from simgen.base.strict_models import shorten
+from pcii.base import InputError
+from simgen.assets import read_texture
+from simgen.base import LARGEST_FILE_BYTES, LONGEST_NAME, asset, shorten
 from simgen.importing.gltf_document import Document, checked_document
-from simgen.spec.scene import names_of_objects
+from simgen.spec import names_of_objects
 
 COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 """Without these there are no meshes; what any other extension adds can be left out."""

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
-from simgen.assets.cutouts import FULL, cut_out
-from simgen.assets.triangles import Triangles, bears_pictures_once
+from pcii.base import LUMINANCE, linear_to_srgb, srgb_to_linear
+from simgen.assets import FULL, Triangles, bears_pictures_once, cut_out
 from simgen.importing.gltf_document import Material, Sampler, TextureInfo
 from simgen.importing.gltf_file import GltfFile
-from simgen.spec.materials import LEAST_INDEX, MOST_INDEX
-from simgen.spectral.spectra import srgb_of
+from simgen.spec import LEAST_INDEX, MOST_INDEX
+from simgen.spectral import srgb_of
 
 BORDER = 1e-4
 """Texture coordinates may pass the borders of a picture by this much."""

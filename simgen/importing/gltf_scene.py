@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
+from simgen.assets import MOST_FACES, MOST_VERTICES, Triangles
 from simgen.importing.foreign_scene import UPRIGHT, ForeignScene, Part
 from simgen.importing.gltf_document import Node, Primitive, PunctualLight
 from simgen.importing.gltf_file import GltfFile, read_gltf
 from simgen.importing.gltf_materials import Surface, light_values
-from simgen.spec.scene import MOST_OBJECTS
+from simgen.spec import MOST_OBJECTS
 
 MIN_EDGE_DEG = 0.1
 """A spot's light falls off within this angle at least."""

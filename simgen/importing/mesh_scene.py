@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.assets.asset_files import obj_parts, read_mesh
-from simgen.assets.triangles import MOST_VERTICES, Triangles
-from simgen.base.file_lookup import asset
-from simgen.base.strict_models import shorten
+from pcii.base import InputError
+from simgen.assets import MOST_VERTICES, Triangles, obj_parts, read_mesh
+from simgen.base import asset, shorten
 from simgen.importing.foreign_scene import ForeignScene, Part
-from simgen.spec.scene import MOST_OBJECTS
+from simgen.spec import MOST_OBJECTS
 
 MESH_KINDS = (".obj", ".ply", ".stl")
 GREY = {"reflectance": [0.7, 0.7, 0.7]}

@@ -9,19 +9,15 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import new_folder_safely
-from pcii.exchange.export_pictures import write_png
-from simgen.assets.asset_files import ply_bytes
-from simgen.assets.triangles import Triangles
-from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
+from pcii.base import InputError, new_folder_safely
+from pcii.exchange import write_png
+from simgen.assets import Triangles, ply_bytes
+from simgen.base import LARGEST_TOML_BYTES, shorten, toml_text, validate
 from simgen.importing.foreign_scene import ForeignScene, Part
 from simgen.importing.gltf_scene import GltfScene
 from simgen.importing.mesh_scene import MESH_KINDS, MeshScene
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_reference import reference_to
-from simgen.spec.mitsuba_file import MitsubaFile, MitsubaXml
-from simgen.spec.scene import Scene, check_unscored, names_of_objects
+from simgen.renderer import backend, reference_to
+from simgen.spec import MitsubaFile, MitsubaXml, Scene, check_unscored, names_of_objects
 
 MIN_SHEAR = 1e-5
 """Axes of a matrix whose cosine is less than this are square to each other."""

@@ -17,7 +17,7 @@ from simgen.photons.candidates import CandidateSampler, FilmPoints, is_on_film, 
 from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.emission_sampler import EmissionSampler, film_px, image_px_per_mm2
-from simgen.renderer.light_tracing import Arrivals, LampTracer
+from simgen.renderer import Arrivals, LampTracer
 
 SEED = 0
 """What is found decides on how photons are drawn, not where they fall: with one seed for all, datasets that
@@ -147,11 +147,7 @@ def mirrored_light(
 
 
 def _arrivals(
-    tracer: LampTracer,
-    lamps: np.ndarray,
-    is_searched: np.ndarray,
-    film_light: float,
-    least_radiance: float,
+    tracer: LampTracer, lamps: np.ndarray, is_searched: np.ndarray, film_light: float, least_radiance: float
 ) -> Arrivals:
     """Light of the numbers `lamps` that mirrors and glass send to the cameras, or that comes straight from
     lamps of which `is_searched` (all lamps,) says so: followed until it is known, or too little to matter."""

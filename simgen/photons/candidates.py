@@ -9,14 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.bayer import colour_cells
-from pcii.types.camera_grid import CameraGrid
+from pcii.base import InputError
+from pcii.types import CameraGrid, colour_cells
 from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
-from simgen.renderer.mitsuba_scene import not_finite
-from simgen.sensor.photon_table import PhotonTable, no_photons
+from simgen.renderer import not_finite
+from simgen.sensor import PhotonTable, no_photons
 
 
 class ImageCells(NamedTuple):

@@ -9,14 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from pcii.types.bayer import channel_count, colour_cells
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid, channel_count, colour_cells
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import Cameras, Rig, as_rig, corners, with_larger_pixels
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Photons
-from simgen.truth.first_hits import first_hits_of_view
+from simgen.cameras import Cameras, Rig, as_rig, corners, with_larger_pixels
+from simgen.renderer import RenderScene
+from simgen.sensor import PhotonTable
+from simgen.spec import Photons
+from simgen.truth import first_hits_of_view
 
 COARSE_PX = 64
 """Longer side of films on which a scene is looked at first."""

@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.photon_limit import sense
+from pcii.base import InputError
+from pcii.types import sense
 from simgen.base import random_streams as seeds
 from simgen.photons.bright_light import LEAST_SHARE, BrightLight, lit_light, mirrored_light, straight_light
 from simgen.photons.capture import Capture
 from simgen.photons.exploration import Plan, explore
 from simgen.photons.pilot import sampler_of_films
 from simgen.photons.thinning import MAX_SINGLE_PHOTONS
-from simgen.renderer.radiance import render_view
-from simgen.spec.recipe import MOST_PATHS
+from simgen.renderer import render_view
+from simgen.spec import MOST_PATHS
 
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 """Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
@@ -132,11 +132,7 @@ def _noise(rows: Sequence[BrightLight]) -> float:
 
 
 def plan_counts(
-    capture: Capture,
-    kind: str,
-    min_samples: int = 1,
-    *,
-    may_explore: Callable[[Plan], bool] = lambda _: True,
+    capture: Capture, kind: str, min_samples: int = 1, *, may_explore: Callable[[Plan], bool] = lambda _: True
 ) -> Plan:
     """Thin, or render densely, whichever takes less time for counts without rendering noise.
 

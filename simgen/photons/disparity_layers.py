@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 
 TILES_ACROSS = 256
 """Largest number of tiles along the longer side of a film, about, whatever its pixels."""

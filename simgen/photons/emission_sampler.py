@@ -14,15 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE
-from pcii.types.bayer import colour_cells
-from simgen.cameras.rig import Rig
+from pcii.base import LUMINANCE
+from pcii.types import colour_cells
+from simgen.cameras import Rig
 from simgen.photons.candidates import Accepted, is_on_film, nothing
 from simgen.photons.capture import Capture
 from simgen.photons.shining_pieces import pieces_in_view
-from simgen.renderer.emission import ShiningSurface
-from simgen.renderer.intersection import standing_before
-from simgen.sensor.photon_table import PhotonTable
+from simgen.renderer import ShiningSurface, standing_before
+from simgen.sensor import PhotonTable
 
 SHADOW_EPSILON = 1e-5
 """Of the distance: what stands nearer than this before a shining point does not hide it. Single precision

@@ -19,9 +19,9 @@ from copy import deepcopy
 
 import numpy as np
 
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid
 from simgen.photons.disparity_layers import DisparityLayers, Samples, squares_around
-from simgen.truth.first_hits import over_squares
+from simgen.truth import over_squares
 
 COARSE_TILES = 8
 """Coarse tiles are 8 x 8 tiles."""

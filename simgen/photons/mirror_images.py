@@ -13,13 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import Rig
+from simgen.cameras import Rig
 from simgen.photons.bright_light import SEED, BrightLight
 from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, nothing
 from simgen.photons.capture import Capture
 from simgen.photons.emission_sampler import EmissionSampler, film_px
 from simgen.photons.wavefront_sampler import WavefrontSampler
-from simgen.sensor.photon_table import PhotonTable, joined, no_photons
+from simgen.sensor import PhotonTable, joined, no_photons
 
 NEIGHBOURS = 256
 """Arrivals nearest to a camera, from which places of images on its film are interpolated."""

@@ -17,9 +17,7 @@ from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.mirror_images import KnownPlaces, MirrorImages, find_images
 from simgen.photons.scalar_sampler import ScalarSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
-from simgen.renderer.backend import is_scalar
-from simgen.renderer.path_tracing import bright_directions, surrounding_radiance
-from simgen.renderer.wavelengths import light_of
+from simgen.renderer import bright_directions, is_scalar, light_of, surrounding_radiance
 
 EXPLORATION_SEED = 0
 """What is found before photons are drawn decides their cost, not where they fall: with one seed for all,
@@ -114,10 +112,7 @@ def send_pilot(capture: Capture, emission: EmissionSampler) -> Pilot:
 
 
 def _meet_bright_light(
-    sampler: CandidateSampler,
-    known_paths: tuple[int, int],
-    film_light: float,
-    emission: EmissionSampler,
+    sampler: CandidateSampler, known_paths: tuple[int, int], film_light: float, emission: EmissionSampler
 ) -> tuple[KnownPlaces, list[BrightLight], list[BrightLight], Samples]:
     """What is drawn where it is known to be; bright light that few paths meet, first such as paths can be
     aimed at and then such as matters and they cannot; and paths to what is lit brightly.

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE
+from pcii.base import LUMINANCE
 from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film
 from simgen.photons.disparity_layers import Samples
-from simgen.renderer.intersection import objects_by_shape, rows_of
-from simgen.sensor.photon_table import PhotonTable
+from simgen.renderer import objects_by_shape, rows_of
+from simgen.sensor import PhotonTable
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""

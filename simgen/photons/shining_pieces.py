@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simgen.cameras.rig import Rig, as_rig, corners
-from simgen.renderer.emission import ShiningSurface
+from simgen.cameras import Rig, as_rig, corners
+from simgen.renderer import ShiningSurface
 
 NEAREST_MM = 1e-3
 """What shines nearer to a camera than this is taken to be this far away."""

@@ -23,8 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.progress import Report, silent
+from pcii.base import InputError, Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Accepted, CandidateSampler
 from simgen.photons.capture import Capture, ranks_in_scopes
@@ -33,7 +32,7 @@ from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore
 from simgen.photons.majorant import Majorant
 from simgen.photons.mirror_images import KnownPlaces
 from simgen.photons.pilot import sampler_class
-from simgen.sensor.photon_table import PhotonTable, joined, no_photons
+from simgen.sensor import PhotonTable, joined, no_photons
 
 WAVEFRONT = 1 << 21
 """Largest number of candidates that are traced at once."""

@@ -19,11 +19,26 @@ from simgen.photons.candidates import (
 from simgen.photons.capture import Capture
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
-from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned, whole
-from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, mirrored_radiance, radiance_along
-from simgen.renderer.random_numbers import RandomNumbers, streams_for
-from simgen.renderer.wavelengths import light_of, of_colour
-from simgen.sensor.photon_table import PhotonTable
+from simgen.renderer import (
+    FirstHits,
+    RandomNumbers,
+    doubles,
+    film_rays,
+    floats,
+    gathered,
+    hit_first,
+    light_of,
+    load_drjit,
+    mirrored_radiance,
+    of_colour,
+    opaque,
+    radiance_along,
+    signed,
+    streams_for,
+    unsigned,
+    whole,
+)
+from simgen.sensor import PhotonTable
 
 LEAST_GUESS = 1e-30
 

@@ -24,10 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.executor import threads_of_worker
-from simgen.base.file_lookup import cached
-from simgen.base.rendering_packages import check_installed
+from pcii.base import InputError, threads_of_worker
+from simgen.base import cached, check_installed
 
 VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 LIBRARY_FOLDERS = ("usr/lib", "usr/lib64", "usr/local/lib", "usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib")

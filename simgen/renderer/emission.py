@@ -9,18 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE
-from simgen.assets.asset_files import Assets
-from simgen.assets.triangles import Triangles, bears_pictures_once, globe, surface_points, triangles_of
+from pcii.base import LUMINANCE, InputError
+from simgen.assets import Assets, Triangles, bears_pictures_once, globe, surface_points, triangles_of
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
 from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
 from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
-from simgen.spec import lights
-from simgen.spec.scene import Scene, SceneObject
-from simgen.spec.shapes import Card, Sphere
-from simgen.spectral.filters import Filters
-from simgen.spectral.spectra import DAYLIGHT, integral
+from simgen.spec import Card, Scene, SceneObject, Sphere, lights
+from simgen.spectral import DAYLIGHT, Filters, integral
 
 NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE
-from simgen.cameras.rig import Rig
+from pcii.base import LUMINANCE
+from simgen.cameras import Rig
 from simgen.renderer.backend import is_scalar, load_drjit, vectors
 from simgen.renderer.intersection import objects_by_shape
 from simgen.renderer.mitsuba_scene import RenderScene, shape_number

@@ -13,16 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE
-from simgen.base.strict_models import shorten, suggestion
+from pcii.base import LUMINANCE, InputError
+from simgen.base import shorten, suggestion
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
 from simgen.renderer.emission import ShiningSurface, sample_light
 from simgen.renderer.mitsuba_shapes import WorldFrame, across_faces
-from simgen.spec.mitsuba_file import OF_RECIPES, MitsubaFile, MitsubaXml
-from simgen.spec.scene import check_unscored, names_of_objects
-from simgen.spectral.filters import Filters
-from simgen.spectral.spectra import WAVELENGTH_NM, integral
+from simgen.spec import OF_RECIPES, MitsubaFile, MitsubaXml, check_unscored, names_of_objects
+from simgen.spectral import WAVELENGTH_NM, Filters, integral
 
 AXES_OF_CAMERA = np.diag([-1.0, -1.0, 1.0])
 """Mitsuba's sensors have X to the left and Y up; the world X to the right and Y down."""

@@ -7,20 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.types.camera_grid import CameraGrid
-from simgen.assets.asset_files import Assets, read_assets
-from simgen.assets.triangles import triangles_of
+from pcii.base import InputError
+from pcii.types import CameraGrid
+from simgen.assets import Assets, read_assets, triangles_of
 from simgen.renderer import emission
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.mitsuba_reference import Reference, reference_to
 from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, shape_plugin
 from simgen.renderer.mitsuba_surfaces import paint_patterns, reflectance_plugin, surface_key, surface_plugin
-from simgen.spec.lights import EnvironmentLight
-from simgen.spec.scene import MOST_OBJECTS, Backdrop, Scene
-from simgen.spec.shapes import Mesh, Sphere
-from simgen.spectral.filters import Filters, filters_for
+from simgen.spec import MOST_OBJECTS, Backdrop, EnvironmentLight, Mesh, Scene, Sphere
+from simgen.spectral import Filters, filters_for
 
 BACKDROP, OBJECT, LIGHT = "simgen:backdrop", "simgen:object", "simgen:light"
 """Ids of shapes, which none of a Mitsuba file has; those of objects and lights end in their numbers."""

@@ -10,13 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.assets.asset_files import Assets
-from simgen.assets.cutouts import cut_out
-from simgen.assets.triangles import Triangles, globe, triangles_of
-from simgen.spec.materials import Material
-from simgen.spec.scene import SceneObject
-from simgen.spec.shapes import Card, Mesh, Shape, Sphere
+from pcii.base import InputError
+from simgen.assets import Assets, Triangles, cut_out, globe, triangles_of
+from simgen.spec import Card, Material, Mesh, SceneObject, Shape, Sphere
 
 SMALL_BALL_SHARE = 0.02
 """A ball that shines is a mesh if its radius is a smaller share of the scene's size. Mitsuba aims at its own

@@ -8,15 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE, srgb_to_linear
-from simgen.assets.asset_files import Assets
-from simgen.assets.texture_pixels import paint
+from pcii.base import LUMINANCE, srgb_to_linear
+from simgen.assets import Assets, paint
 from simgen.renderer.backend import is_spectral
 from simgen.renderer.mitsuba_shapes import check_texcoords
-from simgen.spec.lights import Illuminant
-from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, Reflectance, is_clear
-from simgen.spec.scene import SceneObject
-from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
+from simgen.spec import (
+    Box,
+    Card,
+    Cylinder,
+    Glass,
+    Illuminant,
+    Material,
+    Matt,
+    Mesh,
+    Metal,
+    Plastic,
+    Principled,
+    Reflectance,
+    SceneObject,
+    Shape,
+    Sphere,
+    is_clear,
+)
 from simgen.spectral import spectra
 
 

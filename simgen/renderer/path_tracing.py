@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from simgen.cameras.rig import Rig, film_slopes, slopes_behind_lens
+from simgen.cameras import Rig, film_slopes, slopes_behind_lens
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
 from simgen.renderer.mitsuba_scene import RenderScene, shape_number
@@ -190,11 +190,7 @@ def mirrored_radiance(
 
 
 def radiance_along(
-    render_scene: RenderScene,
-    ray: Any,
-    record: Any,
-    sampler: Any,
-    left_out: tuple[Any, Any] | None = None,
+    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, left_out: tuple[Any, Any] | None = None
 ) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
@@ -288,15 +284,7 @@ class _Tracer:
         return radiance
 
     def next_segment(
-        self,
-        hit: Any,
-        bsdf: Any,
-        sampler: Any,
-        side: int,
-        bounces: int,
-        bounce: int,
-        active: Any,
-        hides: Any,
+        self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, bounce: int, active: Any, hides: Any
     ) -> tuple[Any, Any, Any, Any, Any, Any]:
         """The segment that leaves `hit` as number `bounce` of `bounces`, in a direction that `bsdf` chose.
 

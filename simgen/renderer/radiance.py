@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.cameras.rig import Camera, Cameras, as_rig
+from pcii.base import InputError
+from simgen.cameras import Camera, Cameras, as_rig
 from simgen.renderer.backend import load_drjit, shape_numbers
 from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_scene import RenderScene, not_finite

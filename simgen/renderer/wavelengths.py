@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
-from pcii.base.srgb import LUMINANCE
+from pcii.base import LUMINANCE
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.spectral.filters import CELLS, HEROES, Filters
-from simgen.spectral.spectra import WAVELENGTH_NM
+from simgen.spectral import CELLS, HEROES, WAVELENGTH_NM, Filters
 
 
 class Light:

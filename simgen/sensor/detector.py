@@ -18,17 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.exchange.array_files import open_array
-from pcii.types.arrays import read_only
-from pcii.types.bayer import colour_index, mosaic
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.photon_counts import PhotonCounts
+from pcii.base import InputError
+from pcii.exchange import open_array
+from pcii.types import CameraGrid, PhotonCounts, colour_index, mosaic, read_only
+from simgen.base import asset
 from simgen.base import random_streams as seeds
-from simgen.base.file_lookup import asset
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
-from simgen.spec.recipe import Exposure, Photons, Sensor
-from simgen.spectral.filters import sensitivity
+from simgen.spec import Exposure, Photons, Sensor
+from simgen.spectral import sensitivity
 
 PHOTONS_PER_LUMEN_SECOND = 555e-9 / (683 * 6.62607015e-34 * 299792458)
 """Photons of 555 nm; CODATA values of h and c, SI value of the luminous efficacy."""

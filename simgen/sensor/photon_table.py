@@ -5,9 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pcii.types.arrays import read_only
-from pcii.types.bayer import colour_cells
-from pcii.types.camera_grid import CameraGrid
+from pcii.types import CameraGrid, colour_cells, read_only
 
 NO_OBJECT = -1
 """Object id of a count that no photon made."""

@@ -4,10 +4,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from simgen.base.file_lookup import EnvironmentName
-from simgen.base.strict_models import (
+from simgen.base import (
     Colour,
     Direction,
+    EnvironmentName,
     Length,
     Position,
     Positive,
@@ -15,7 +15,7 @@ from simgen.base.strict_models import (
     Strict,
     completed_by,
 )
-from simgen.spectral.spectra import illuminant_names, known_illuminant
+from simgen.spectral import illuminant_names, known_illuminant
 
 NamedIlluminant = Annotated[
     str,
@@ -149,8 +149,7 @@ class EnvironmentLight(Strict):
 
 LightAround = UniformLight | EnvironmentLight
 Light = Annotated[
-    AreaLight | PointLight | SpotLight | DirectionalLight | LightAround,
-    Field(discriminator="type"),
+    AreaLight | PointLight | SpotLight | DirectionalLight | LightAround, Field(discriminator="type")
 ]
 
 

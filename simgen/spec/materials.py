@@ -10,11 +10,10 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from pcii.base.srgb import srgb_to_linear
-from simgen.base.file_lookup import ImageName
-from simgen.base.strict_models import Colour, NonNegative, Positive, Real, Share, Strict, Whole, completed_by
+from pcii.base import srgb_to_linear
+from simgen.base import Colour, ImageName, NonNegative, Positive, Real, Share, Strict, Whole, completed_by
 from simgen.spec.lights import Illuminant, string_or_value
-from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
+from simgen.spectral import WAVELENGTH_NM, known_patch, patch_names
 
 LEAST_INDEX, MOST_INDEX = 1.01, 3.0
 """Refractive indices that the renderer takes."""

@@ -13,9 +13,8 @@ from xml.parsers import expat
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from pcii.base.errors import InputError
-from simgen.base.file_lookup import AssetName, asset
-from simgen.base.strict_models import Length, Position, Strict, shown_value
+from pcii.base import InputError
+from simgen.base import AssetName, Length, Position, Strict, asset, shown_value
 
 LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
 """Limits of all files together that make up a scene; Mitsuba's own parser has none."""

@@ -4,10 +4,9 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from pcii.store.dataset_card import Terms
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.readout import MOST_BITS, MOST_FRAMES, Readout
-from simgen.base.strict_models import (
+from pcii.store import Terms
+from pcii.types import MOST_BITS, MOST_FRAMES, CameraGrid, Readout
+from simgen.base import (
     LARGEST_MM,
     Count,
     Length,
@@ -20,7 +19,7 @@ from simgen.base.strict_models import (
     Whole,
     completed_by,
 )
-from simgen.spectral.filters import camera_names
+from simgen.spectral import camera_names
 
 MAX_SHEAR_PX = 1e9
 """Larger shears would overflow the shifts of views, which are 32-bit numbers of pixels."""

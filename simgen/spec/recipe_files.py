@@ -6,9 +6,8 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pcii.base.errors import InputError
-from simgen.base.file_lookup import find, find_all
-from simgen.base.strict_models import read_toml, shown_value, suggestion, validate
+from pcii.base import InputError
+from simgen.base import find, find_all, read_toml, shown_value, suggestion, validate
 from simgen.spec.recipe import Recipe
 
 OF_ITS_SCENE = ("title", "analysis")

@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
-from pcii.store.folders import entries
-from simgen.base.file_lookup import AssetName, asset, named_files
-from simgen.base.strict_models import (
+from pcii.base import InputError, write_bytes_safely
+from pcii.store import entries
+from simgen.base import (
     LARGEST_MM,
     LARGEST_TOML_BYTES,
+    AssetName,
     Length,
     Position,
     Real,
     Strict,
     Title,
     Vector,
+    asset,
+    named_files,
     shorten,
     shown_value,
     suggestion,

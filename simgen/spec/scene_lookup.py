@@ -16,10 +16,8 @@ from contextlib import suppress
 from pathlib import Path
 from random import Random
 
-from pcii.base.errors import InputError
-from pcii.base.extensions import package_of, registered
-from simgen.base.file_lookup import find, find_all
-from simgen.base.strict_models import read_toml, shown_value, suggestion
+from pcii.base import InputError, package_of, registered
+from simgen.base import find, find_all, read_toml, shown_value, suggestion
 from simgen.spec.recipe import SEED_LIMIT
 from simgen.spec.scene import Scene, scene_of
 

@@ -4,8 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from simgen.base.file_lookup import MeshName
-from simgen.base.strict_models import Length, Real, Strict
+from simgen.base import Length, MeshName, Real, Strict
 
 
 class Sphere(Strict):

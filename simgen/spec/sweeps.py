@@ -18,9 +18,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import numpy as np
 from pydantic import BaseModel
 
-from pcii.base.errors import InputError
-from pcii.store.folders import hash_json
-from simgen.base.strict_models import validate
+from pcii.base import InputError
+from pcii.store import hash_json
+from simgen.base import validate
 from simgen.spec.recipe import Recipe
 from simgen.spec.recipe_files import override, read_recipe, recipe_file
 from simgen.spec.scene_lookup import find_scene, is_scene

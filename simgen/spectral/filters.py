@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from simgen.base.strict_models import suggestion
+from pcii.base import InputError
+from simgen.base import suggestion
 from simgen.spectral.spectra import WAVELENGTH_NM, colour_science, integral, measured, observer, resampled
 
 PEAK_NM = 555.0

@@ -13,11 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE, linear_to_srgb
-from simgen.base.file_lookup import cached
-from simgen.base.rendering_packages import not_installed
-from simgen.base.strict_models import suggestion
+from pcii.base import LUMINANCE, InputError, linear_to_srgb
+from simgen.base import cached, not_installed, suggestion
 
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """From CIE XYZ to linear sRGB."""

@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.progress import Report, silent
-from pcii.types.camera_grid import CameraGrid
-from simgen.cameras.rig import Camera, Cameras, Rig, as_rig, centre_camera
-from simgen.renderer.intersection import blocked, first_objects, first_points
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.renderer.radiance import sensor_plugin
+from pcii.base import Report, silent
+from pcii.types import CameraGrid
+from simgen.cameras import Camera, Cameras, Rig, as_rig, centre_camera
+from simgen.renderer import RenderScene, blocked, first_objects, first_points, sensor_plugin
 
 BESIDE_EDGE_PX = 0.01
 """Rays so far from a pixel's centre pass beside an edge between triangles that the centre meets exactly: much

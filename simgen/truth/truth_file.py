@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.progress import Report
-from pcii.store.dataset_layout import TRUTH
-from pcii.store.zarr_groups import new_array, new_group_safely
-from pcii.types.array_labels import TRUTH_LABELS
-from simgen.cameras.rig import Rig, centre_camera
-from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.spec.recipe import Products, ViewPass
+from pcii.base import Report
+from pcii.store import TRUTH, new_array, new_group_safely
+from pcii.types import TRUTH_LABELS
+from simgen.cameras import Rig, centre_camera
+from simgen.renderer import RenderScene
+from simgen.spec import Products, ViewPass
 from simgen.truth.first_hits import (
     coverage,
     first_hits_at_centre,

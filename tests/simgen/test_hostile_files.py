@@ -78,10 +78,7 @@ def test_links_out_of_the_folder_and_pipes(tmp_path: Path) -> None:
     (tmp_path / "secret.png").write_bytes(png())
     (folder / "link.png").symlink_to(tmp_path / "secret.png")
     os.mkfifo(folder / "pipe.png")
-    for name, message in {
-        "link.png": "lies outside",
-        "pipe.png": "there is no file",
-    }.items():
+    for name, message in {"link.png": "lies outside", "pipe.png": "there is no file"}.items():
         sentence = refusal(scene_with(folder, name, None))
         assert message in sentence
         assert name in sentence

@@ -139,8 +139,7 @@ def test_16_bits_are_kept(channels: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "name"),
-    [("1", "a.png"), ("P", "a.png"), ("RGBA", "a.png"), ("L", "a.tif")],
+    ("mode", "name"), [("1", "a.png"), ("P", "a.png"), ("RGBA", "a.png"), ("L", "a.tif")]
 )
 def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     image = Image.new("RGB", (3, 2), "white")

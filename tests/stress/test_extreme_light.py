@@ -11,11 +11,7 @@ import pcii
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)
-MODES: list[dict[str, Any]] = [
-    {},
-    {"variance": True},
-    {"subpixel": 2},
-]
+MODES: list[dict[str, Any]] = [{}, {"variance": True}, {"subpixel": 2}]
 
 
 def constant(value: float, dtype: type = np.float64, channels: int = 1) -> pcii.Views:

@@ -16,10 +16,7 @@ import pcii
 ROOT = Path(__file__).resolve().parents[2]
 GRID = pcii.CameraGrid(rows=3, cols=4, pitch_mm=(5.0, 4.0), focal_mm=50.0, pixel_mm=0.25, height=37, width=41)
 
-MODES: list[dict[str, Any]] = [
-    {"variance": True},
-    {"subpixel": 2},
-]
+MODES: list[dict[str, Any]] = [{"variance": True}, {"subpixel": 2}]
 
 
 def results(grid: pcii.CameraGrid = GRID) -> dict[str, str]:
@@ -64,10 +61,7 @@ def results_of(threads: int, height: int) -> dict[str, str]:
         "print(json.dumps(results(replace(GRID, height=int(sys.argv[2])))))\n"
     )
     folders = [ROOT, *(ROOT / "tests" / name for name in (".", "pcii", "stress"))]
-    environment = os.environ | {
-        "NUMBA_NUM_THREADS": "4",
-        "PYTHONPATH": os.pathsep.join(map(str, folders)),
-    }
+    environment = os.environ | {"NUMBA_NUM_THREADS": "4", "PYTHONPATH": os.pathsep.join(map(str, folders))}
     done = subprocess.run(
         [sys.executable, "-W", "error::RuntimeWarning", "-c", script, str(threads), str(height)],
         capture_output=True,

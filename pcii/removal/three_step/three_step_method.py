@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pcii.base.errors import InputError
+from pcii.base import InputError
 from pcii.removal.three_step.bright_regions import (
     EDGE_SMOOTHING_PX,
     SMALLEST_REGION_PX,
@@ -25,14 +25,8 @@ from pcii.removal.three_step.bright_regions import (
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.variance_threshold import adaptive_threshold, cell_px_for, tolerance_px
 from pcii.removal.three_step.watershed_pieces import pieces_along_ridges
-from pcii.sections.photon_statistics import (
-    pooled_plane,
-    section_window_px,
-)
-from pcii.sections.reconstruction import PROBE_STEPS_PX, extend, reconstruct, with_probes
-from pcii.types.estimates import Segmented
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.sections import PROBE_STEPS_PX, extend, pooled_plane, reconstruct, section_window_px, with_probes
+from pcii.types import PhotonCounts, Sections, Segmented
 
 PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
 LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2
@@ -118,13 +112,7 @@ class ThreeStep:
             steps["fine"] = fine & in_focus.repeat(M, axis=1).repeat(M, axis=2)
         return Segmented(bright & in_focus, self.name, requested, steps)
 
-    def _bright(
-        self,
-        counts: PhotonCounts,
-        sections: Sections,
-        plane: int,
-        window_px: int,
-    ) -> np.ndarray:
+    def _bright(self, counts: PhotonCounts, sections: Sections, plane: int, window_px: int) -> np.ndarray:
         """Step 2 on voxels M times finer, (H M, W M) bool; without it voxels with a photon near."""
         M = self.subpixel
         if M > 1:

@@ -5,17 +5,10 @@ The paper gives no T; here it is derived from the Poisson law. docs/theory.md ha
 
 import numpy as np
 
-from pcii.base.blocks import on_pixels
+from pcii.base import on_pixels
 from pcii.removal.three_step.bright_regions import large_pieces, roberts_magnitude
-from pcii.sections.photon_statistics import (
-    ViewSamples,
-    photons_around_a_photon,
-    truncated_poisson_variance,
-    view_samples,
-)
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.photon_counts import PhotonCounts
-from pcii.types.section_stack import Sections
+from pcii.sections import ViewSamples, photons_around_a_photon, truncated_poisson_variance, view_samples
+from pcii.types import FocalPlanes, PhotonCounts, Sections
 
 WINDOW_CELLS = 4
 PHOTONS_PER_SAMPLE = 10.0

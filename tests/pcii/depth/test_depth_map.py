@@ -5,13 +5,7 @@ import pytest
 from twins import bayer_photons, blocky_texture, opaque_views, patch_views, photons_of, unit_grid
 
 from pcii.base import InputError
-from pcii.depth import (
-    NetworkInputs,
-    PosteriorDepth,
-    SheetModel,
-    estimate_depth,
-    run_network,
-)
+from pcii.depth import NetworkInputs, PosteriorDepth, SheetModel, estimate_depth, run_network
 from pcii.evidence import without_hot_pixels
 from pcii.removal import segment
 from pcii.store import sample

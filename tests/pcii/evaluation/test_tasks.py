@@ -25,11 +25,7 @@ LIGHT = Views(np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.f
 IDS = np.zeros((40, 48), np.int16)
 IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
-OF_COUNTS = [
-    "depth:posterior",
-    "depth:sweep-17",
-    "depth:variance-sweep",
-]
+OF_COUNTS = ["depth:posterior", "depth:sweep-17", "depth:variance-sweep"]
 FULL_LIGHT = "full-light"
 OF_VIEWS = ["depth:posterior", "depth:variance-sweep", "depth:structure-tensor"]
 

@@ -93,8 +93,7 @@ def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> Non
 
 
 @pytest.mark.parametrize(
-    ("array", "words"),
-    [(COUNTS, "--counts for photons; got int64"), (np.array(3.0), r"\(K, L, H, W")],
+    ("array", "words"), [(COUNTS, "--counts for photons; got int64"), (np.array(3.0), r"\(K, L, H, W")]
 )
 def test_arrays_that_are_no_light_are_refused(array: np.ndarray, words: str) -> None:
     with pytest.raises(InputError, match=words):

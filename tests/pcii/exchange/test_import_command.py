@@ -107,8 +107,7 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
 
 
 @pytest.mark.parametrize(
-    ("shear", "words"),
-    [(0, "--shear-px, such as (2.[5-9]|3) (2.[5-9]|3);"), (2.7, "sharpest at 6")],
+    ("shear", "words"), [(0, "--shear-px, such as (2.[5-9]|3) (2.[5-9]|3);"), (2.7, "sharpest at 6")]
 )
 def test_shifted_pictures_are_told_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
     """A wall at 1.6 and a card at 3.9 px per camera, of which 2.7 px were taken out."""

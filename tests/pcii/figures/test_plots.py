@@ -17,14 +17,7 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
 import pcii
-from pcii.figures import (
-    accuracy_chart,
-    calibration_chart,
-    depth_image,
-    exposed,
-    smoothed,
-    smoothing_for,
-)
+from pcii.figures import accuracy_chart, calibration_chart, depth_image, exposed, smoothed, smoothing_for
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
 Z_MM = [1.0, 2.0]

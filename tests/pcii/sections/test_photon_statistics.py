@@ -165,8 +165,7 @@ def saturated(rate: float, frames: int, bits: int) -> tuple[PhotonCounts, float]
 
 
 @pytest.mark.parametrize(
-    ("rate", "frames", "bits"),
-    [(0.01, 1, 1), (1.0, 1, 1), (3.0, 20, 1), (2.0, 1, 2), (20.0, 4, 3)],
+    ("rate", "frames", "bits"), [(0.01, 1, 1), (1.0, 1, 1), (3.0, 20, 1), (2.0, 1, 2), (20.0, 4, 3)]
 )
 def test_the_loss_is_found_from_the_counts(rate: float, frames: int, bits: int) -> None:
     counts, lost = saturated(rate, frames, bits)

@@ -51,11 +51,7 @@ def dataset_of(out: Path, scene: simgen.Scene, **tables: Any) -> pcii.Dataset:
 
 def assert_same(counts: pcii.PhotonCounts, truth: pcii.Truth, dataset: pcii.Dataset) -> None:
     """Photons, their frames and origins, and the truth, are those of the dataset."""
-    assert (counts.grid, counts.cfa, counts.readout) == (
-        dataset.grid,
-        dataset.cfa,
-        dataset.counts.readout,
-    )
+    assert (counts.grid, counts.cfa, counts.readout) == (dataset.grid, dataset.cfa, dataset.counts.readout)
     for name in "klijn":
         np.testing.assert_array_equal(getattr(counts.events, name), getattr(dataset.counts.events, name))
     if dataset.counts.frame is not None:

@@ -31,13 +31,7 @@ def recipe_file(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize(
-    "others",
-    [
-        [["scene=two_objects"]],
-        pytest.param(OTHERS, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("others", [[["scene=two_objects"]], pytest.param(OTHERS, marks=pytest.mark.slow)])
 def test_datasets_are_the_same_whatever_was_made_before(
     others: list[list[str]], recipe_file: str, tmp_path: Path
 ) -> None:

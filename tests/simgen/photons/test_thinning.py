@@ -303,8 +303,7 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         # The reference is good to 0.2 % of a tile.
         return float(
             stats.chi2.sf(
-                ((found - expected)[seen] ** 2 / (expected + (0.002 * expected) ** 2)[seen]).sum(),
-                seen.sum(),
+                ((found - expected)[seen] ** 2 / (expected + (0.002 * expected) ** 2)[seen]).sum(), seen.sum()
             )
         )
 

@@ -93,11 +93,7 @@ def tiles_of(views: list[np.ndarray]) -> np.ndarray:
 
 @pytest.mark.renders
 @pytest.mark.parametrize(
-    ("content", "names", "is_thinned"),
-    [
-        (GLOSSY, {"ball", "one", "two"}, True),
-        (FOGGY, {"cloud"}, False),
-    ],
+    ("content", "names", "is_thinned"), [(GLOSSY, {"ball", "one", "two"}, True), (FOGGY, {"cloud"}, False)]
 )
 def test_views_truth_and_photons_are_those_of_mitsuba(
     folder: Path, content: str, names: set[str], is_thinned: bool

@@ -14,14 +14,7 @@ from simgen.truth import first_hits_of_view
 
 pytestmark = pytest.mark.renders
 GRID = CameraGrid(
-    rows=1,
-    cols=2,
-    pitch_mm=(9.0, 5.0),
-    focal_mm=50.0,
-    pixel_mm=0.5,
-    height=70,
-    width=80,
-    shear_px=(1.5, 0.0),
+    rows=1, cols=2, pitch_mm=(9.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=70, width=80, shear_px=(1.5, 0.0)
 )
 
 

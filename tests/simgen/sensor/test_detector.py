@@ -19,13 +19,7 @@ COLUMNS = [field.name for field in fields(PhotonTable)]
 
 def films(rows: int, cols: int, height: int, width: int) -> CameraGrid:
     return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=(5.0, 5.0),
-        focal_mm=50.0,
-        pixel_mm=0.1,
-        height=height,
-        width=width,
+        rows=rows, cols=cols, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.1, height=height, width=width
     )
 
 

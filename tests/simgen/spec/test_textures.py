@@ -8,15 +8,7 @@ import pytest
 
 from pcii.base import InputError, srgb_to_linear
 from simgen.assets import paint
-from simgen.spec import (
-    Checks,
-    Edge,
-    Noise,
-    Star,
-    Stripes,
-    Text,
-    Texture,
-)
+from simgen.spec import Checks, Edge, Noise, Star, Stripes, Text, Texture
 
 RED, GREY = (0.9, 0.1, 0.2), (0.6, 0.6, 0.6)
 LINEAR = srgb_to_linear(np.array([RED, GREY]))

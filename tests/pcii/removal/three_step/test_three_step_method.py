@@ -165,10 +165,7 @@ def test_planes_are_the_cheapest_of_all_cuts_of_the_tree():
         for _ in range(40):
             cost = rng.uniform(0, 4, size=(5, 3))
             best = min(
-                (
-                    sum(cost[list(part)].sum(axis=0).min() for part in parts) + 2 * border_cost * inner[n],
-                    n,
-                )
+                (sum(cost[list(part)].sum(axis=0).min() for part in parts) + 2 * border_cost * inner[n], n)
                 for n, parts in enumerate(partitions)
             )
             expected = np.full(5, -1)
