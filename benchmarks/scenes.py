@@ -14,5 +14,5 @@ def capture_of(recipe: Recipe) -> Capture:
 
 
 def film(side_px: int) -> list[str]:
-    """Settings of a square film of so many pixels that sees what the paper's cameras see."""
+    """Settings of a film of `side_px` x `side_px` pixels that sees what the paper's cameras see."""
     return [f"grid.height={side_px}", f"grid.width={side_px}", f"grid.pixel_mm={36.0448 / side_px}"]

@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def grid_of(rows: int, cols: int, difference_px: float) -> pcii.CameraGrid:
-    """The grid whose total disparities at `NEAR_MM` and `FAR_MM` differ by so much."""
+    """The grid whose total disparities at `NEAR_MM` and `FAR_MM` differ by `difference_px`."""
     pixel_mm = FILM_MM / SIDE_PX
     baseline_mm = difference_px * pixel_mm / FOCAL_MM / (1 / NEAR_MM - 1 / FAR_MM)
     pitch_mm = baseline_mm / (max(rows, cols) - 1)

@@ -1,7 +1,7 @@
 """Run notebooks, by default all, and store their outputs: `python docs/make_notebooks.py [NOTEBOOK ...]`.
 
 A cell shows what Jupyter would show of it: what it prints, its last value unless a semicolon follows, and its
-figures. Nothing that differs from run to run is stored: neither times nor what is told while work goes on.
+figures. Nothing that differs from run to run is stored: neither times nor progress.
 """
 
 import ast

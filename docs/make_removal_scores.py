@@ -29,7 +29,7 @@ def results(submissions: Path) -> pd.DataFrame:
     table = table[~table["scene"].astype(str).str.endswith(IN_FRAMES)]
     values = table.pivot(index=["scene", "method", "light"], columns="measure", values="mean").reset_index()
     kinds = {scene.name: scene.kind for scene in load_definition("pcii-bench-1")[0].scene}
-    return values.dropna(subset="iou").assign(kind=lambda own: own["scene"].astype(str).map(kinds))
+    return values.dropna(subset="iou").assign(kind=lambda rows: rows["scene"].astype(str).map(kinds))
 
 
 def draw(values: pd.DataFrame, file: Path) -> None:
@@ -39,12 +39,12 @@ def draw(values: pd.DataFrame, file: Path) -> None:
     for column, kind in enumerate(shown):
         of_kind = values[values["kind"] == kind].groupby(["method", "light"], observed=True)
         of_methods = of_kind[["iou", "seconds"]].mean().groupby(level="method")
-        for number, (method, own) in enumerate(of_methods):
+        for number, (method, scores) in enumerate(of_methods):
             style = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 4, "linewidth": 1.3}
             axes[0, column].plot(
-                own.index.get_level_values("light").to_list(), own["iou"], label=method, **style
+                scores.index.get_level_values("light").to_list(), scores["iou"], label=method, **style
             )
-            axes[1, column].plot(own["seconds"], own["iou"], linestyle="none", **style)
+            axes[1, column].plot(scores["seconds"], scores["iou"], linestyle="none", **style)
         axes[0, column].set(title=kind, xlabel="photons per view")
         axes[1, column].set(xlabel="seconds")
     for axis in axes.flat:

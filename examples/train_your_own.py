@@ -37,9 +37,9 @@ def features(example: dict[str, np.ndarray]) -> np.ndarray:
     light = smoothed(example["sections"].mean(axis=1), 2)[:, ::2, ::2]
     parts = [np.arcsinh(width**2 * smoothed(example["evidence"], width)) for width in WIDTHS]
     parts.append(np.sqrt(light / max(light.mean(), 1e-9)))
-    own = np.stack(parts)
-    own = np.concatenate([own, own - uniform_filter1d(own, 5, axis=1)])  # sharper than planes around it
-    return np.concatenate([own, own * (np.log10(light.mean() + 1e-9) + 2)])
+    stack = np.stack(parts)
+    stack = np.concatenate([stack, stack - uniform_filter1d(stack, 5, axis=1)])  # sharper than planes around
+    return np.concatenate([stack, stack * (np.log10(light.mean() + 1e-9) + 2)])
 
 
 def train(examples: pcii.Examples, seconds: float) -> np.ndarray:
@@ -48,16 +48,16 @@ def train(examples: pcii.Examples, seconds: float) -> np.ndarray:
     weights, losses = np.zeros(0), []
     while time.monotonic() - begin < seconds:
         example = examples[int(rng.integers(len(examples)))]
-        own, true = features(example), example["plane"][::2, ::2]
+        inputs, true = features(example), example["plane"][::2, ::2]
         rows, cols = np.nonzero(true >= 0)
         if not rows.size:
             continue
-        weights = weights if weights.size else np.zeros(len(own))
-        own, true = own[:, :, rows, cols], true[rows, cols]
-        chance = softmax(np.tensordot(weights, own, 1), axis=0)
+        weights = weights if weights.size else np.zeros(len(inputs))
+        inputs, true = inputs[:, :, rows, cols], true[rows, cols]
+        chance = softmax(np.tensordot(weights, inputs, 1), axis=0)
         losses.append(-np.log(chance[true, np.arange(true.size)] + 1e-12).mean())
         chance[true, np.arange(true.size)] -= 1
-        gradient = np.tensordot(own, chance, 2) / true.size
+        gradient = np.tensordot(inputs, chance, 2) / true.size
         square = MEMORY * square + (1 - MEMORY) * gradient**2
         weights = weights - RATE * gradient / np.sqrt(square + 1e-8)
         if len(losses) % 100 == 0:

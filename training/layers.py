@@ -24,7 +24,7 @@ MOVED = 8
 
 
 def moved(x: Tensor, planes: int) -> Tensor:
-    """The features (B, Z, ...) of the plane so many steps before, 0 where there is none."""
+    """The features (B, Z, ...) of the plane that is `planes` before each, 0 where there is none."""
     padded = f.pad(x, (0,) * 6 + (max(planes, 0), max(-planes, 0)))
     return padded[:, : x.shape[1]] if planes > 0 else padded[:, -planes:]
 

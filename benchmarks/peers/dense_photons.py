@@ -17,6 +17,6 @@ def rendered_mosaic(capture: Capture, view: int, samples_per_pixel: int, seed: i
 
 
 def drawn_counts(mosaic: np.ndarray, cfa: str | None, budget: float, rng: np.random.Generator) -> np.ndarray:
-    """Counts (H, W) of a view with so many photons on average."""
+    """Counts (H, W) of a view, drawn with a mean of `budget` photons."""
     rates = photon_rates(mosaic, cfa, Light(budget), scope_energies(mosaic, cfa, "view"))
     return rng.poisson(rates)

@@ -56,7 +56,7 @@ SIZES: Mapping[Size, Mapping[str, Any]] = {
 
 
 def measure(names: Sequence[str], rows: int, side_px: int, seeds: int, budgets: Sequence[int]) -> Measured:
-    """All methods on recipes that ship, with so many by so many cameras and pixels."""
+    """All methods on recipes that ship, with `rows` x `rows` cameras of `side_px` x `side_px` pixels."""
     pitch_mm = 45 * 2 / (rows - 1)  # twice the paper's span, so that coarse pixels tell depths apart
     *nested, most = sorted(budgets)
     settings = [

@@ -83,7 +83,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], dic
 
 
 def dense_name(samples: int) -> str:
-    """What dense rendering with so many samples per pixel is called."""
+    """Name of dense rendering with this number of samples per pixel."""
     return f"{DENSE}, samples: {samples}"
 
 

@@ -27,12 +27,12 @@ VIEWS = ["grid.rows=1", "grid.cols=2", "products.radiance=none"]
 THINNING, DENSE = "thinning", "dense + Poisson"
 DISTANCES = "Time of a view, and distance from the true distribution (1 is exact)"
 USUAL = 1000.0
-"""Photons per view that ratios are told of."""
+"""Photons per view of the published ratios."""
 EXCESS = 0.01
 """Dispersion above 1 that is small: `simgen` allows itself no more."""
 TILE_PX = 16
 GROUPS = 16
-"""Pixels are divided at random into so many groups, whose figures give the intervals."""
+"""Number of random groups of pixels; the spread of their figures gives the intervals."""
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
@@ -99,7 +99,7 @@ def compared(
 
 
 def counts_of(capture: Capture, samples: int, seed: int) -> np.ndarray:
-    """Counts (V, H, W) by dense rendering with so many samples per pixel, by thinning with 0."""
+    """Counts (V, H, W) by dense rendering with `samples` per pixel, or by thinning if that is 0."""
     grid, budget = capture.grid, capture.photons.budget
     if not samples:
         table, _ = thin_photons(replace(capture, seed=seed))
@@ -108,7 +108,7 @@ def counts_of(capture: Capture, samples: int, seed: int) -> np.ndarray:
         return flat.reshape(grid.view_count, grid.height, grid.width)
     rng = np.random.default_rng([seed, int(budget)])
     seeds = [1 + seed * grid.view_count + view for view in range(grid.view_count)]
-    mosaics = [rendered_mosaic(capture, view, samples, own) for view, own in enumerate(seeds)]
+    mosaics = [rendered_mosaic(capture, view, samples, view_seed) for view, view_seed in enumerate(seeds)]
     return np.array([drawn_counts(mosaic, capture.cfa, budget, rng) for mosaic in mosaics])
 
 

@@ -49,7 +49,7 @@ def measure(side_px: int, samples: Sequence[int], repeats: int, reference: int) 
 
 
 def rendered(capture: Capture, samples: int, seed: int) -> np.ndarray:
-    """The view (H, W, 3) with so many samples per pixel."""
+    """The view (H, W, 3), rendered with this number of samples per pixel."""
     return render_view(capture.render_scene, capture.grid, 0, 0, samples_per_pixel=samples, seed=seed)
 
 

@@ -27,7 +27,7 @@ BORDER_PX = 80
 SHOWN_PX = 13.3
 """The disparity that is drawn and read, which is neither whole nor half."""
 BLOCKS = 4
-"""Errors are told of so many by so many blocks of a section, whose spread gives the interval."""
+"""A section is divided into `BLOCKS` x `BLOCKS` blocks; the spread of their errors gives the interval."""
 PLANE_MM = 1.0
 ONE_COLOUR = "Sections of one colour"
 THREE_COLOURS = "Sections of three colours from mosaics"

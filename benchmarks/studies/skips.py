@@ -36,7 +36,7 @@ SIZES: Mapping[Size, Mapping[str, Any]] = {
 
 
 def measure(scenes: int, side_px: int, realistic_px: int, repeats: int) -> Measured:
-    """Every skip on so many random scenes, and on one before them that warms up.
+    """Every skip on random scenes, and on one before them that warms up.
 
     Those that save little are then repeated with the paper's cameras on films of `realistic_px`.
     """
