@@ -56,7 +56,7 @@ def test_thinned_photons_see_nothing_in_the_furnace() -> None:
 
 @pytest.mark.parametrize(("roughness", "spectral"), [(0.01, False), (0.1, True), (0.5, False)])
 def test_plastic_gives_no_more_than_it_gets(roughness: float, spectral: bool) -> None:
-    finish = {"finish": {"type": "plastic", "roughness": roughness}}
+    finish: dict[str, Any] = {"finish": {"type": "plastic", "roughness": roughness}}
     coated = ball("ball", 0, 300, radius_mm=55, reflectance=[1, 1, 1], **finish)
     view = seen(build_scene([coated], [EVENLY], spectral=spectral, max_depth=DEPTH), GRID, 256)
     middle = view[8:24, 8:24].mean(axis=(0, 1))
@@ -70,7 +70,7 @@ def test_plastic_gives_no_more_than_it_gets(roughness: float, spectral: bool) ->
 
 @pytest.mark.parametrize(("pane", "spectral"), [(False, False), (True, False), (False, True)])
 def test_glass_in_the_furnace_cannot_be_seen(pane: bool, spectral: bool) -> None:
-    material = {"finish": {"type": "glass"}}
+    material: dict[str, Any] = {"finish": {"type": "glass"}}
     turn_deg = (0.0, 30.0, 0.0)
     glass = (
         card(300, 150, material, turn_deg=turn_deg)
@@ -89,7 +89,7 @@ def test_glass_in_the_furnace_cannot_be_seen(pane: bool, spectral: bool) -> None
 
 TILES = {"type": "checks", "rows": 7, "columns": 5, "colours": [[0.9, 0.9, 0.9], [0.1, 0.2, 0.6]]}
 BEHIND = card(600.0, 500.0, {"texture": TILES})
-GLASS = {"finish": {"type": "glass"}}
+GLASS: dict[str, Any] = {"finish": {"type": "glass"}}
 BALL = ball("ball", -70, 400, radius_mm=55, y_mm=20, **GLASS)
 PANE = card(450, 120, GLASS, "pane", (0, 40, 0), (70, 0))
 PANE["shape"]["height_mm"] = 180.0

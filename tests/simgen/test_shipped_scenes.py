@@ -146,7 +146,8 @@ def test_scripts_make_the_files_beside_them(file: Path, tmp_path: Path) -> None:
         assert old.stat().st_size < MOST_ASSET_BYTES
         if new.suffix == ".png":  # the same pixels: compressors differ
             with Image.open(new) as one, Image.open(old) as other:
-                np.testing.assert_array_equal(*(np.asarray(image.convert("RGB")) for image in (one, other)))
+                pixels = [np.asarray(image.convert("RGB")) for image in (one, other)]
+                np.testing.assert_array_equal(pixels[0], pixels[1])
         elif new.suffix == ".exr":
             with OpenEXR.File(str(new)) as one, OpenEXR.File(str(old)) as other:
                 pixels = (part.channels()["RGB"].pixels for part in (one, other))

@@ -280,9 +280,10 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
     lamp = LAMP | {"position_mm": (-250, -350, 150), "target_mm": (0, 0, 580), "luminance_cd_m2": 2e4}
     lamp |= {"width_mm": 60, "height_mm": 60}
     wall = card(800.0, 4000.0, {"reflectance": (0.5, 0.5, 0.5)}, "wall")
-    metal = {"finish": {"type": "metal", "name": "Al", "roughness": 0.05}}
+    metal: dict[str, Any] = {"finish": {"type": "metal", "name": "Al", "roughness": 0.05}}
+    matt: dict[str, Any] = {"reflectance": (0.7, 0.3, 0.2)}
     grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
-    for material, is_bounded in ((metal, False), ({"reflectance": (0.7, 0.3, 0.2)}, True)):
+    for material, is_bounded in ((metal, False), (matt, True)):
         scene = lit([wall, ball("ball", 40.0, 590.0, **material)], [lamp])
         capture = Capture(scene, grid, "GRBG", Photons(budget=3000), seed=1)
         made = plan_counts(capture, backend.choose().kind)
