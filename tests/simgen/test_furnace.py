@@ -1,7 +1,7 @@
-"""The furnace: in light that is the same from everywhere, what absorbs nothing cannot be seen. And glass.
+"""The furnace: in light that is the same from everywhere, what absorbs nothing cannot be seen.
 
 Whatever a surface sends back it was sent, so that a scene of reflectance 1 has the radiance of its
-surroundings everywhere; what absorbs is darker, and nothing is brighter.
+surroundings everywhere; what absorbs is darker, and nothing is brighter. Glass reflects what Fresnel says.
 """
 
 from pathlib import Path

@@ -11,7 +11,7 @@ from scipy import stats
 
 from pcii.base import InputError
 from pcii.types import CameraGrid, colour_index, mosaic
-from simgen.sensor import PhotonTable, dark_map, detect, full_light_image, no_photons, read_out
+from simgen.sensor import PhotonTable, dark_map, detect, draw_counts, full_light_image, no_photons, read_out
 from simgen.spec import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)
@@ -46,6 +46,13 @@ DARKNESS = no_photons()
 def detected(arrivals: PhotonTable, sensor: Sensor, seed: int) -> np.ndarray:
     """Counts per pixel of a sensor in colour, (K, L, H, W)."""
     return counted(detect(arrivals, GRID, "GRBG", sensor, seed), GRID)
+
+
+@pytest.mark.parametrize("rate", [0.34, 1e-3])  # the paper's brightest pixels, and low light
+def test_counts_have_mean_and_variance_of_their_rate(rate: float) -> None:
+    counts = draw_counts(np.full((400, 500), rate), None, np.random.default_rng(3), None)
+    assert is_poisson(counts, rate)
+    assert not has_mean(2 * counts, rate)  # the fault of a well-known simulator at low light
 
 
 FAULTS = (
