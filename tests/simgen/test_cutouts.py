@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import card, film, made
+from lit_scenes import EVENLY, build_scene, card, film
 from PIL import Image
 from scipy.ndimage import label
 
@@ -13,8 +13,6 @@ from pcii.base import InputError
 from simgen.assets import Triangles, box, card_triangles, cut_out, cylinder
 from simgen.spec import Material
 from simgen.truth import first_hits_at_centre
-
-SKY = {"type": "uniform", "luminance_cd_m2": 1.0}
 
 
 def area(mesh: Triangles | None) -> float:
@@ -31,13 +29,11 @@ def disc(side: int, radius: float) -> np.ndarray:
 
 
 def test_a_disc_is_cut_where_its_opacity_is_a_half() -> None:
-    mesh = cut_out(card_triangles(200.0, 100.0), disc(64, 0.3), tiled=False)
-    assert mesh is not None
+    mesh: Any = cut_out(card_triangles(200.0, 100.0), disc(64, 0.3), tiled=False)
     # Chords of 1/64 of the width, less than 1e-3; pieces overlap by a thousandth of a pixel.
     assert area(mesh) == pytest.approx(np.pi * 0.3**2 * 200 * 100, rel=2e-3)
     x, y = mesh.positions[:, 0] / 200, mesh.positions[:, 1] / 100
     assert np.hypot(x, y).max() == pytest.approx(0.3, abs=1e-4)
-    assert mesh.texcoords is not None
     np.testing.assert_allclose(mesh.texcoords, np.stack([x + 0.5, 0.5 - y], axis=-1), atol=1e-6)
 
 
@@ -53,8 +49,7 @@ def test_what_is_kept_and_what_is_cut_are_the_whole(shape: Triangles) -> None:
 
 def test_beyond_its_borders_an_image_is_repeated_or_goes_on() -> None:
     top_left = np.outer([1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0])
-    wide = card_triangles(200.0, 100.0)
-    assert wide.texcoords is not None
+    wide: Any = card_triangles(200.0, 100.0)
     twice = Triangles(wide.positions, wide.faces, None, 2 * wide.texcoords)
     once, again = (cut_out(twice, top_left, tiled=tiled) for tiled in (False, True))
     # In pixels: two columns of five rows, or two columns of one row in four places; a line across the middle
@@ -66,10 +61,8 @@ def test_beyond_its_borders_an_image_is_repeated_or_goes_on() -> None:
     assert np.ptp(once.positions, axis=0) == pytest.approx([50, 62.5, 0], rel=3e-3)
 
 
-def leaf(material: dict[str, Any]) -> dict[str, Any]:
-    return card(400.0, 200.0, {"reflectance": [0.9, 0.2, 0.2], "opacity": "a.png", **material}) | {
-        "name": "leaf"
-    }
+def leaf(**material: Any) -> dict[str, Any]:
+    return card(400.0, 200.0, {"reflectance": [0.9, 0.2, 0.2], "opacity": "a.png", **material}, "leaf")
 
 
 @pytest.mark.renders
@@ -79,7 +72,7 @@ def test_truth_is_what_lies_behind_a_hole(tmp_path: Path) -> None:
     y, x = (np.mgrid[:256, :256] + 0.5) / 256 - 0.5
     ring = np.clip(0.5 + 0.1 - np.abs(np.hypot(x, y) - 0.3), 0, 1)
     Image.fromarray((ring * 65535).astype(np.uint16)).save(tmp_path / "a.png")
-    built = made([leaf({}), card(600.0, 400.0, {"reflectance": [0.5] * 3})], [SKY], folder=tmp_path)
+    built = build_scene([leaf(), card(600.0, 400.0, {"reflectance": [0.5] * 3})], [EVENLY], folder=tmp_path)
     hits = first_hits_at_centre(built, grid)
     row, col = (np.mgrid[:96, :96] - 47.5) / 192 * 400 / 200  # in widths of the leaf
     away = np.abs(np.hypot(row, col) - 0.3) - 0.1
@@ -97,9 +90,9 @@ def test_no_ray_slips_between_the_pieces(tmp_path: Path, scale: int) -> None:
     for i, j in np.ndindex(3, 3):
         opacity[8 + i :: 16, 8 + j :: 16] = 0
     Image.fromarray(opacity).save(tmp_path / "a.png")
-    thing = leaf({}) | {"rotation_deg": (20.0, 30.0, 40.0), "position_mm": (0.0, 0.0, 400.0 * scale)}
+    thing = leaf() | {"rotation_deg": (20.0, 30.0, 40.0), "position_mm": (0.0, 0.0, 400.0 * scale)}
     thing["shape"] = {"type": "card", "width_mm": 200.0 * scale, "height_mm": 200.0 * scale}
-    hits = first_hits_at_centre(made([thing], [SKY], folder=tmp_path), grid)
+    hits = first_hits_at_centre(build_scene([thing], [EVENLY], folder=tmp_path), grid)
     numbers = np.zeros(hits.object_id.shape, np.int64)
     label(hits.object_id == 0, output=numbers)
     sizes = np.bincount(numbers.ravel())
@@ -111,13 +104,13 @@ def test_no_ray_slips_between_the_pieces(tmp_path: Path, scale: int) -> None:
 
 
 @pytest.mark.renders
-def test_what_cannot_be_cut_is_told(tmp_path: Path) -> None:
+def test_what_cannot_be_cut_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.full((4, 4), 255, np.uint8)).save(tmp_path / "a.png")
-    ball = leaf({}) | {"shape": {"type": "sphere", "radius_mm": 9.0}}
+    ball = leaf() | {"shape": {"type": "sphere", "radius_mm": 9.0}}
     with pytest.raises(InputError, match=r"object 'leaf', material.opacity: it cannot be laid on a sphere"):
-        made([ball], [SKY], folder=tmp_path)
+        build_scene([ball], [EVENLY], folder=tmp_path)
     Image.fromarray(np.full((4, 4), 100, np.uint8)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match=r"object 'leaf', material.opacity: leaves nothing of the surface"):
-        made([leaf({})], [SKY], folder=tmp_path)
+        build_scene([leaf()], [EVENLY], folder=tmp_path)
     with pytest.raises(ValueError, match="opacity: a surface that light passes through"):
         Material.model_validate({"finish": {"type": "glass"}, "opacity": "a.png"})

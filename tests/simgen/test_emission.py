@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, made, seen, surprise, thinned
+from lit_scenes import LAMP, SCALAR, build_scene, card, film, seen, surprise, thinned
 from PIL import Image
 
 from pcii.base import LUMINANCE, InputError, srgb_to_linear
+from simgen.assets import Triangles, ply_bytes
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_surfaces import light_spectrum
 from simgen.spectral import illuminant, integral, observer
@@ -16,20 +17,14 @@ from simgen.spectral import illuminant, integral, observer
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GRID = film()
 WALL = card(500.0, 600.0, {"reflectance": [0.6] * 3})
-BLACK = [0.0, 0.0, 0.0]
 L = 1000.0
 
 
 def shining(shape: dict[str, Any], emission: dict[str, Any], **more: Any) -> dict[str, Any]:
     """A black object above the cameras' view that shines upon the wall."""
-    material = {"reflectance": BLACK, "emission": {"luminance_cd_m2": L, **emission}}
-    return {
-        "name": "panel",
-        "position_mm": (60.0, -250.0, 380.0),
-        "shape": shape,
-        "material": material,
-        **more,
-    }
+    material = {"reflectance": [0.0, 0.0, 0.0], "emission": {"luminance_cd_m2": L, **emission}}
+    thing = {"name": "panel", "position_mm": (60.0, -250.0, 380.0), "shape": shape, "material": material}
+    return thing | more
 
 
 # Turned about X by 120 degrees a card, which faces -Z, faces the wall from above, at 60 degrees.
@@ -38,15 +33,13 @@ PANEL = shining({"type": "card", "width_mm": 90.0, "height_mm": 50.0}, {}, rotat
 
 def test_a_card_that_shines_is_an_area_light() -> None:
     towards = np.array([0.0, np.sin(np.radians(120)), -np.cos(np.radians(120))])
-    lamp = {
-        "type": "area",
-        "position_mm": PANEL["position_mm"],
-        "target_mm": tuple(PANEL["position_mm"] + 100 * towards),
-        "width_mm": 90.0,
-        "height_mm": 50.0,
-        "luminance_cd_m2": L,
-    }
-    by_lamp, by_card = seen(made([WALL], [lamp]), GRID, 256), seen(made([WALL, PANEL], []), GRID, 256)
+    target_mm = tuple(PANEL["position_mm"] + 100 * towards)
+    lamp = LAMP | {"position_mm": PANEL["position_mm"], "target_mm": target_mm, "luminance_cd_m2": L}
+    lamp |= {"width_mm": 90.0, "height_mm": 50.0}
+    by_lamp, by_card = (
+        seen(build_scene([WALL], [lamp]), GRID, 256),
+        seen(build_scene([WALL, PANEL], []), GRID, 256),
+    )
     assert by_lamp.mean() > 1
     np.testing.assert_allclose(by_card, by_lamp, rtol=0.04)
     np.testing.assert_allclose(by_card.mean(), by_lamp.mean(), rtol=2e-3)
@@ -64,7 +57,7 @@ def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
         thing = shining({"type": "card", "width_mm": 90.0, "height_mm": 50.0}, {"texture": "a.png"})
     # In sight, so that its own light is among what is counted.
     thing = thing | {"position_mm": (60.0, -120.0, 450.0)}
-    built = made([WALL, thing], [], max_depth=3, folder=tmp_path)
+    built = build_scene([WALL, thing], [], max_depth=3, folder=tmp_path)
     view = seen(built, GRID, 1024)
     gain = 20_000 / view.mean() / GRID.height / GRID.width
     photons, _ = thinned(built, GRID, gain)
@@ -72,20 +65,16 @@ def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
 
 
 def write_octahedron(path: Path) -> None:
-    corners = ["1 0 0", "-1 0 0", "0 1 0", "0 -1 0", "0 0 1", "0 0 -1"]
-    faces = ["0 2 4", "2 1 4", "1 3 4", "3 0 4", "2 0 5", "1 2 5", "3 1 5", "0 3 5"]
-    names = [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
-    head = ["ply", "format ascii 1.0", "element vertex 6", *names]
-    head += ["element face 8", "property list uchar int vertex_indices", "end_header"]
-    body = [f"{corner} {corner}" for corner in corners] + [f"3 {face}" for face in faces]
-    path.write_text("\n".join([*head, *body]) + "\n")
+    corners = np.vstack([np.eye(3), -np.eye(3)])
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    path.write_bytes(ply_bytes(Triangles(corners, np.array(faces), corners)))
 
 
 def test_the_level_counts_what_shines() -> None:
     """A ball behind the cameras lights the wall."""
     behind = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, -200.0)}
     level = {"illuminance_lux": 300.0, "z_mm": 500.0}
-    view = seen(made([WALL, behind], [], level=level), GRID, 256)
+    view = seen(build_scene([WALL, behind], [], level=level), GRID, 256)
     reflectance = float(srgb_to_linear(np.array(0.6)))
     assert view[15:17, 15:17].mean() == pytest.approx(reflectance / np.pi * 300, rel=0.01)
 
@@ -105,7 +94,7 @@ def test_an_image_shines_where_it_is_bright(tmp_path: Path) -> None:
         rotation_deg=(180.0, 0.0, 0.0),
         position_mm=(-50.0, -300.0, 300.0),
     )
-    views = [seen(made([WALL, thing], [], folder=tmp_path), GRID, 256) for thing in (screen, alone)]
+    views = [seen(build_scene([WALL, thing], [], folder=tmp_path), GRID, 256) for thing in (screen, alone)]
     assert (views[0][..., 0] > 0).all()
     assert not views[0][..., 1:].any()
     np.testing.assert_allclose(views[0], views[1], rtol=0.1)
@@ -130,8 +119,8 @@ def test_the_spectrum_of_a_colour_has_it(colour: tuple[float, float, float]) -> 
         ({"type": "mesh", "file": "lamp.ply"}, "no texture coordinates"),
     ],
 )
-def test_images_that_cannot_shine_are_told(tmp_path: Path, shape: dict[str, Any], sentence: str) -> None:
+def test_images_that_cannot_shine_are_refused(tmp_path: Path, shape: dict[str, Any], sentence: str) -> None:
     Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path / "a.png")
     write_octahedron(tmp_path / "lamp.ply")
     with pytest.raises(InputError, match=rf"object 'panel', material.emission.texture: .*{sentence}"):
-        made([shining(shape, {"texture": "a.png"})], [], folder=tmp_path)
+        build_scene([shining(shape, {"texture": "a.png"})], [], folder=tmp_path)

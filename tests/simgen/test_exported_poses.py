@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
+from lit_scenes import EVENLY, ball
 
 from pcii.exchange import export_dataset
 from simgen.dataset import generate
@@ -13,15 +15,13 @@ from simgen.spec import Recipe
 
 pytestmark = pytest.mark.renders
 CENTRE_MM, RADIUS_MM, WALL_MM = (12.0, -21.0, 500.0), 30.0, 800.0
-SCENE = f"""title = "A ball up to the right before a wall"
-lights = [{{ type = "uniform", luminance_cd_m2 = 100.0 }}]
-backdrop = {{ z_mm = {WALL_MM} }}
-[[objects]]
-name = "ball"
-position_mm = {list(CENTRE_MM)}
-shape = {{ type = "sphere", radius_mm = {RADIUS_MM} }}
-material = {{ reflectance = [0.8, 0.8, 0.8] }}
-"""
+BALL = ball("ball", 12.0, 500.0, (0.8, 0.8, 0.8), RADIUS_MM, -21.0)
+SCENE = {
+    "title": "A ball up to the right",
+    "lights": [EVENLY],
+    "objects": [BALL],
+    "backdrop": {"z_mm": WALL_MM},
+}
 GRID = {"rows": 2, "cols": 3, "pitch_mm": [18.0, 12.0], "pixel_mm": 0.5, "height": 40, "width": 50}
 SHEARED = {"shear_px": [3.0, -2.0]}
 ERRORS = {"errors": {"position_sd_mm": [1.0, 1.0, 5.0], "rotation_sd_deg": [1.0, 1.0, 5.0]}}
@@ -42,7 +42,7 @@ def points_mm(folder: Path, frame: dict[str, Any]) -> np.ndarray:
 @pytest.mark.parametrize("grid", [{}, SHEARED, ERRORS], ids=["plain", "sheared", "errors"])
 def test_pixels_of_all_cameras_see_the_same_ball_and_wall(tmp_path: Path, grid: dict[str, Any]) -> None:
     (tmp_path / "ball").mkdir()
-    (tmp_path / "ball" / "scene.toml").write_text(SCENE)
+    (tmp_path / "ball" / "scene.toml").write_text(tomli_w.dumps(SCENE))
     values = {
         "scene": "ball",
         "grid": GRID | grid,

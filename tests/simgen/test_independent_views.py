@@ -1,13 +1,14 @@
 """No two views of a large grid share their noise: not of rendering, not of photons, not of the detector."""
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import pytest
-from lit_views import made
+import tomli_w
+from lit_scenes import EVENLY, LAMP, build_scene
+from photon_statistics import counted
 
 from pcii.store import open_dataset
 from simgen.base import random_streams as seeds
@@ -20,15 +21,11 @@ SIDE, CAMERAS = 32, 6
 VIEWS, PAIRS = CAMERAS**2, CAMERAS**2 * (CAMERAS**2 - 1) // 2
 MOST = 5 / SIDE
 """Of 630 independent coefficients, each normal of width 1 / 32, one exceeds it in one of 2700 cases."""
-SCENE = """title = "An evenly lit wall"
-lights = [{ %s }]
-"""
-WALL = "backdrop = { z_mm = 500, reflectance = [0.8, 0.8, 0.8] }"
-LAMP = (
-    'type = "area", position_mm = [300, 0, 100], target_mm = [0, 0, 500], '
-    "width_mm = 300, height_mm = 300, luminance_cd_m2 = 100.0"
-)
-EVENLY = 'type = "uniform", luminance_cd_m2 = 100.0'
+NEAR_LAMP = LAMP | {"position_mm": [300, 0, 100], "target_mm": [0, 0, 500]}
+NEAR_LAMP |= {"width_mm": 300, "height_mm": 300, "luminance_cd_m2": 100.0}
+BACKDROP = {"z_mm": 500.0, "reflectance": [0.8, 0.8, 0.8]}
+WALL: dict[str, Any] = {"title": "An evenly lit wall", "lights": [NEAR_LAMP], "backdrop": BACKDROP}
+LIGHT_ALONE = {"title": "Light", "lights": [EVENLY | {"luminance_cd_m2": 100.0}]}
 # Cameras so close together that all see the same.
 GRID = {
     "rows": CAMERAS,
@@ -38,12 +35,11 @@ GRID = {
     "height": SIDE,
     "width": SIDE,
 }
-EXPOSURE = {"f_number": 4.0, "time_s": 1e-7}
 
 
-def dataset(folder: Path, lamp: str, wall: str = WALL, **changes: Any) -> Path:
+def dataset(folder: Path, scene: dict[str, Any] = WALL, **changes: Any) -> Path:
     (folder / "wall").mkdir()
-    (folder / "wall" / "scene.toml").write_text(SCENE % lamp + wall)
+    (folder / "wall" / "scene.toml").write_text(tomli_w.dumps(scene))
     values: dict[str, Any] = {
         "scene": "wall",
         "seed": 11,
@@ -56,8 +52,7 @@ def dataset(folder: Path, lamp: str, wall: str = WALL, **changes: Any) -> Path:
 
 
 def radiance(path: Path) -> np.ndarray:
-    views = open_dataset(path).views
-    assert views is not None
+    views: Any = open_dataset(path).views
     return np.stack([np.asarray(views.radiance[k, l])[..., 0] for k, l in np.ndindex(CAMERAS, CAMERAS)])
 
 
@@ -81,22 +76,18 @@ def likeness(pixels: np.ndarray) -> np.ndarray:
 
 
 def rendered(folder: Path) -> np.ndarray:
-    return radiance(dataset(folder, LAMP, photons={"budget": 100}))
+    return radiance(dataset(folder, photons={"budget": 100}))
 
 
 def one_by_one(folder: Path) -> np.ndarray:
     grid = Grid.model_validate(GRID).camera_grid()
-    built = made(
-        [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
-    )
-    photons, _ = thin_photons(Capture(built, grid, "GRBG", Photons(budget=4000), seed=11))
-    found = np.zeros((VIEWS, SIDE, SIDE))
-    np.add.at(found, (CAMERAS * photons.k + photons.l, photons.i, photons.j), 1)
-    return found
+    scene = build_scene([], [NEAR_LAMP], backdrop=BACKDROP)
+    photons, _ = thin_photons(Capture(scene, grid, "GRBG", Photons(budget=4000), seed=11))
+    return counted(photons, grid).reshape(VIEWS, SIDE, SIDE)
 
 
 def from_views(folder: Path) -> np.ndarray:
-    path = dataset(folder, LAMP, photons={"budget": 4000}, products={"truth": False})
+    path = dataset(folder, photons={"budget": 4000}, products={"truth": False})
     assert open_dataset(path).manifest["photons"]["method"] == "dense"
     return counts(path)
 
@@ -104,8 +95,8 @@ def from_views(folder: Path) -> np.ndarray:
 def detected(folder: Path) -> np.ndarray:
     sensor = {"full_light": {"full_well_e": 1000.0, "read_noise_e": 3.0, "adc_bits": 12}}
     # Nothing but light, which is rendered without noise: only the detector's is left.
-    bare = {"photons": {"budget": 100}, "sensor": sensor, "exposure": EXPOSURE}
-    return radiance(dataset(folder, EVENLY, "", **bare))
+    bare = {"photons": {"budget": 100}, "sensor": sensor, "exposure": {"f_number": 4.0, "time_s": 1e-7}}
+    return radiance(dataset(folder, LIGHT_ALONE, **bare))
 
 
 @pytest.mark.parametrize("noisy", [rendered, one_by_one, from_views, detected])
@@ -122,6 +113,6 @@ def test_all_pairs_of_views_have_noise_of_their_own(
 
 def test_every_stage_and_view_has_a_seed_of_its_own() -> None:
     stages, views = get_args(seeds.Stage), range(200)
-    own = [seeds.integer(11, view=view, stage=stage) for stage in stages for view in views]
-    assert len(set(own)) == len(own)
-    assert seeds.integer(11 + (1 << 32), stage="photons") not in own
+    integers = [seeds.integer(11, view=view, stage=stage) for stage in stages for view in views]
+    assert len(set(integers)) == len(integers)
+    assert seeds.integer(11 + (1 << 32), stage="photons") not in integers

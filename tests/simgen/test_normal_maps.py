@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import film, made, seen
+from lit_scenes import build_scene, film, seen
 from PIL import Image
 
 from pcii.base import srgb_to_linear
@@ -61,7 +61,7 @@ def test_the_middle_of_a_shape_is_lit_as_if_it_were_tilted(shape: str, folder: P
     # The middle 0.5 mm, so that round things are flat there.
     grid = film(4, 4, focal_mm=4000.0)
     for direction in LIGHTS_GO:
-        view = seen(made([tilted(shape)], [parallel(direction)], folder=folder), grid, 64)
+        view = seen(build_scene([tilted(shape)], [parallel(direction)], folder=folder), grid, 64)
         # Components are stored to 1/255: of a cosine of 0.3 or more that is 2 %.
         np.testing.assert_allclose(view.mean(), expected(direction), rtol=0.02)
     radiances = [expected(direction) for direction in LIGHTS_GO]
@@ -72,7 +72,7 @@ def test_tilts_are_the_same_in_spectra(folder: Path) -> None:
     direction = LIGHTS_GO[1]
     grey = {"reflectance": {"wavelength_nm": (400, 700), "value": (RHO, RHO)}}
     thing = tilted("card", **grey)
-    built = made([thing], [parallel(direction)], folder=folder, spectral=True)
+    built = build_scene([thing], [parallel(direction)], folder=folder, spectral=True)
     view = seen(built, film(8, 8, focal_mm=2000.0), 256)
     np.testing.assert_allclose(view.mean(), expected(direction), rtol=0.02)
 
@@ -81,7 +81,7 @@ def test_a_flat_map_changes_nothing(tmp_path: Path) -> None:
     Image.fromarray(np.tile(np.array([128, 128, 255], np.uint8), (2, 2, 1))).save(tmp_path / "flat.png")
     light = [parallel(LIGHTS_GO[3])]
     grid = film(8, 8, focal_mm=100.0)
-    flat = seen(made([tilted("card", normal_map="flat.png")], light, folder=tmp_path), grid, 64)
-    without = seen(made([tilted("card", normal_map=None)], light), grid, 64)
+    flat = seen(build_scene([tilted("card", normal_map="flat.png")], light, folder=tmp_path), grid, 64)
+    without = seen(build_scene([tilted("card", normal_map=None)], light), grid, 64)
     # 128 of 255 is 0.004 beside the middle.
     np.testing.assert_allclose(flat.mean(), without.mean(), rtol=0.01)

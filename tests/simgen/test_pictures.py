@@ -38,6 +38,9 @@ def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Pa
     assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
     assert_shows_something(look)
     assert_shows_something(sheet)
+    counts = PhotonCounts.from_dense(np.ones(grid().shape_KLHW, dtype=int), grid())
+    save_dataset(tmp_path / "bare", counts, z_mm=[540], title=r"5 $ and \6 $")  # neither truth nor radiance
+    assert command_line.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(tmp_path / "x.png")]) == 0
 
 
 @pytest.mark.parametrize("shape", [(1, 12, 32, 32), (2, 3, 12, 200)])
@@ -63,12 +66,6 @@ def test_a_sheets_panels_have_room_and_do_not_overlap(
         assert not any(box.overlaps(other) for other in boxes[number + 1 :])
     assert f"{shape[0]} x {shape[1]} views of {shape[2]} x {shape[3]} pixels" in figure.texts[0].get_text()
     assert f"{counts.total:,} photons" in figure.texts[0].get_text()
-
-
-def test_a_sheet_of_a_dataset_without_truth_and_light(tmp_path: Path) -> None:
-    counts = PhotonCounts.from_dense(np.ones(grid().shape_KLHW, dtype=int), grid())
-    save_dataset(tmp_path / "bare", counts, z_mm=[540], title=r"5 $ and \6 $")
-    assert command_line.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(tmp_path / "x.png")]) == 0
 
 
 @pytest.mark.parametrize(

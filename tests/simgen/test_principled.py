@@ -3,16 +3,16 @@
 from pathlib import Path
 from typing import Any
 
+import lit_scenes
 import numpy as np
 import pytest
-from lit_views import card, film, made, seen
+from lit_scenes import EVENLY, build_scene, card, film, seen
 from PIL import Image
 
 from pcii.base import InputError, srgb_to_linear
 from simgen.renderer import RenderScene, backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
-EVERYWHERE = {"type": "uniform", "luminance_cd_m2": 1.0}
 LAMP = {"type": "point", "position_mm": (150.0, -200.0, 50.0), "intensity_cd": 0.5}
 COLOUR = (0.8, 0.5, 0.2)
 GRID = film()
@@ -25,12 +25,7 @@ def painted(finish: dict[str, Any], colour: tuple[float, ...] = COLOUR) -> dict[
 
 
 def ball(material: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "name": "ball",
-        "position_mm": (0.0, 0.0, 400.0),
-        "shape": {"type": "sphere", "radius_mm": 90.0},
-        "material": material,
-    }
+    return lit_scenes.ball("ball", 0, 400, radius_mm=90, **material)
 
 
 def in_blocks(view: np.ndarray) -> np.ndarray:
@@ -78,7 +73,7 @@ def by_hand(parameters: dict[str, Any], *, clear: bool) -> RenderScene:
 )
 def test_each_number_does_what_it_does_to_the_renderers_own(ours: dict, theirs: dict) -> None:
     material, clear = painted(ours), "transmission" in ours
-    built = made([ball(material), card(600.0, 300.0, material)], [EVERYWHERE, LAMP], max_depth=DEPTH)
+    built = build_scene([ball(material), card(600.0, 300.0, material)], [EVENLY, LAMP], max_depth=DEPTH)
     view = seen(built, GRID, SAMPLES)
     theirs = {"eta": 1.5, "roughness": 0.5, **theirs}
     same = seen(by_hand(theirs, clear=clear), GRID, SAMPLES, seed=2)
@@ -97,7 +92,7 @@ def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float
     colour = (1.0,) * 3 if metallic == 1 else (0.95,) * 3
     for more in ({}, {"clearcoat": 1.0}) if metallic < 1 else ({},):
         material = painted({"metallic": metallic, "roughness": roughness, **more}, colour)
-        view = seen(made([ball(material)], [EVERYWHERE], max_depth=DEPTH), GRID, 256)
+        view = seen(build_scene([ball(material)], [EVENLY], max_depth=DEPTH), GRID, 256)
         # 4 x 4 pixels of 256 paths that vary by 0.5 or less.
         assert in_blocks(view).max() < 1 + 5 * 0.5 / np.sqrt(4096)
 
@@ -112,7 +107,7 @@ def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int, field
 
     def lit(finish: dict[str, Any]) -> np.ndarray:
         wall = card(400.0, 256.0, painted(finish))
-        return seen(made([wall], [EVERYWHERE, LAMP], folder=tmp_path), GRID, SAMPLES)
+        return seen(build_scene([wall], [EVENLY, LAMP], folder=tmp_path), GRID, SAMPLES)
 
     both = lit({field: "numbers.png"})
     # Away from the middle, where the image's two halves mix.
@@ -124,4 +119,4 @@ def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int, field
 def test_a_coloured_image_of_numbers_is_named(tmp_path: Path) -> None:
     Image.fromarray(np.eye(3, dtype=np.uint8)[None] * 200).save(tmp_path / "coloured.png")
     with pytest.raises(InputError, match=r"object 'ball', material\.finish\.roughness: 'coloured\.png' is"):
-        made([ball(painted({"roughness": "coloured.png"}))], [EVERYWHERE], folder=tmp_path)
+        build_scene([ball(painted({"roughness": "coloured.png"}))], [EVENLY], folder=tmp_path)

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pcii.base import InputError, command_line
 from simgen.app import commands
 from simgen.base import validate
-from simgen.spec import Analysis, Recipe, Scene, load_recipe, load_scene
+from simgen.spec import Analysis, Recipe, Scene, load_recipe
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 EXPOSED = {"f_number": 8.0, "time_s": 0.01}
@@ -40,15 +40,11 @@ def sentence_of(model: type[BaseModel], values: dict) -> str:
     return sentence
 
 
-def test_the_papers_recipe_says_what_the_paper_says() -> None:
-    recipe, _ = load_recipe("paper")
-    grid = recipe.grid.camera_grid()
-    assert grid.shape_KLHW == (10, 10, 1024, 1024)
-    assert (recipe.cfa, recipe.photons.budget, recipe.photons.scope) == ("GRBG", 1000, "view")
-    assert recipe.analysis.z_mm == (540, 620)
-
-
 def test_overrides_take_toml_values_and_bare_words_and_make_tables() -> None:
+    paper, _ = load_recipe("paper")  # says what the paper says
+    assert paper.grid.camera_grid().shape_KLHW == (10, 10, 1024, 1024)
+    assert (paper.cfa, paper.photons.budget, paper.photons.scope) == ("GRBG", 1000, "view")
+    assert paper.analysis.z_mm == (540, 620)
     recipe, _ = load_recipe("paper", ["photons.nested=[100, 300]", "sensor.cfa=RGGB", "exposure.time_s=0.5"])
     assert recipe.photons.nested == (100, 300)
     assert recipe.cfa == "RGGB"
@@ -64,10 +60,10 @@ def test_overrides_take_toml_values_and_bare_words_and_make_tables() -> None:
 
 
 def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> None:
-    own, _ = load_recipe("small")
-    assert own.title == "Ball and bird, small"
+    small, _ = load_recipe("small")
+    assert small.title == "Ball and bird, small"
     assert load_recipe("small", ["scene=same_colour"])[0].title == ""  # so the scene's own title is used
-    assert load_recipe("small", ["scene=two_objects", "seed=3"])[0].title == own.title
+    assert load_recipe("small", ["scene=two_objects", "seed=3"])[0].title == small.title
     assert load_recipe("small", ["title=Balls", "scene=same_colour"])[0].title == "Balls"
     assert load_recipe("small", ["scene=overlap"])[0].analysis == Analysis()  # so the scene's own are taken
     assert load_recipe("small", ["analysis.z_mm=[500]", "scene=overlap"])[0].analysis == Analysis(z_mm=(500,))
@@ -78,9 +74,7 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
     [
         ({"gird": {}}, "unknown key 'gird'; did you mean 'grid'?"),
         ({"grid": {"pich_mm": [1, 1]}}, "unknown key 'grid.pich_mm'; did you mean 'pitch_mm'?"),
-        ({"grid": {"rows": 0}}, "'grid.rows': input should be greater than or equal to 1, got 0"),
         ({"grid": {"rows": 2.0}}, "'grid.rows': input should be a valid integer"),
-        ({"grid": {"pitch_mm": [1, "1"]}}, "'grid.pitch_mm[1]': input should be a valid number"),
         ({"grid": {"focal_mm": 1e-5}}, "focal_mm: 0.00180224 mm or more is needed"),
         ({"grid": {"lens": LENS, "shear_px": (1.0, 0.0)}}, "leave out shear_px"),
         (
@@ -91,7 +85,6 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
         ({"sensor": {"full_light": {}}}, "exposure: photons.scope = 'exposure' and sensor.full_light need"),
         ({"photons": {"scope": "exposure"}}, "exposure: photons.scope = 'exposure' and sensor.full_light"),
         ({"photons": {"budget": float("nan")}}, "'photons.budget'"),
-        ({"photons": {"budget": True}}, "'photons.budget': input should be a valid number"),
         ({"photons": {"nested": [300, 1000]}}, "nested: every budget must be less than budget = 1000"),
         ({"photons": {"nested": [300, 100, 300]}}, "nested: give each budget once"),
         ({"photons": {"statistics": "multinomial", "budget": 10.5}}, "budgets are whole numbers"),
@@ -106,33 +99,25 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
         ({"title": "Ball\u2028"}, "'title': a title is one line without control characters"),
     ],
 )
-def test_a_wrong_recipe_is_told_in_one_sentence(values: dict, message: str) -> None:
+def test_a_wrong_recipe_is_refused_in_one_sentence(values: dict, message: str) -> None:
     assert message in sentence_of(Recipe, {"scene": "x"} | values)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"photons": {"nested": [999.9, 0.5]}},
+def test_what_lies_just_within_the_limits_is_accepted() -> None:
+    for values in (
+        {"photons": {"budget": 1e15, "nested": [999.9, 0.5]}, "title": "Kugel & Vögel, 5 $ < 6 $ \\frac 球"},
         {"photons": {"statistics": "multinomial", "nested": [1, 999]}},
         {"photons": {"scope": "exposure"}, "exposure": {}},
-        {"photons": {"budget": 1e15}},
         {"sensor": {"bits": 32, "hot_pixel_share": 1, "dead_pixel_share": 1}},
         {"sensor": {"full_light": {"adc_bits": 1, "read_noise_e": 0}}, "exposure": EXPOSED},
-        {"title": "Kugel & Vögel, 5 $ < 6 $ \\frac 球"},
-    ],
-)
-def test_what_lies_just_within_the_limits_is_accepted(values: dict) -> None:
-    assert validate(Recipe, {"scene": "x"} | values, "r.toml").scene == "x"
+    ):
+        assert validate(Recipe, {"scene": "x"} | values, "r.toml").scene == "x"
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (
-            scene_with(shape={"type": "sphere", "radius": 5}),
-            "'objects[0].shape.radius'; did you mean 'radius_mm'",
-        ),
+        (scene_with(position_mm=[0, 0, float("inf")]), "'objects[0].position_mm[2]'"),
         (scene_with(shape={"type": "mesh", "file": "a.ply", "scale": [1, 0, 1]}), "a scale is not 0"),
         (scene_with(material={}), "'objects[0].material': give either 'reflectance' or 'texture'"),
         (scene_with(name="../x"), "'objects[0].name': string should match pattern"),
@@ -141,26 +126,15 @@ def test_what_lies_just_within_the_limits_is_accepted(values: dict) -> None:
             {"title": "t", "lights": [LIGHT, {"type": "environment", "file": "a.exr", "luminance_cd_m2": 1}]},
             "only one light can be 'uniform' or 'environment'",
         ),
-        (
-            textured({"type": "checks", "rows": 2, "columns": 2, "colums": 3}),
-            "unknown key 'objects[0].material.texture.colums'; did you mean 'columns'?",
-        ),
+        (textured({"type": "checks", "rows": 2, "colums": 2}), "texture.colums'; did you mean 'columns'?"),
         (textured({"type": "cheks"}), "material.texture.type': there is no 'cheks'; did you mean 'checks'?"),
-        (textured({"type": "zebra"}), "no 'zebra'; known are checks, edge, noise, star, stripes, text"),
         (textured({"spokes": 3}), "'objects[0].material.texture.type' is missing"),
         (textured({"type": "text", "text": "Ω"}), "printable Latin-1 characters, not only spaces"),
         (textured({"type": "noise", "contrast": 0.44}), "contrast: 0.44 puts more than 1% of the values"),
     ],
 )
-def test_a_wrong_scene_is_told_in_one_sentence(values: dict, message: str) -> None:
+def test_a_wrong_scene_is_refused_in_one_sentence(values: dict, message: str) -> None:
     assert message in sentence_of(Scene, values)
-
-
-def test_a_missing_recipe_or_scene_gets_a_suggestion() -> None:
-    with pytest.raises(InputError, match="did you mean 'paper'"):
-        load_recipe("papre")
-    with pytest.raises(InputError, match="did you mean 'two_objects'"):
-        load_scene("two_object")
 
 
 def test_a_command_prints_each_fault_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

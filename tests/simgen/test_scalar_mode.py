@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from lit_views import SCALAR
+from lit_scenes import SCALAR
 
 HERE = Path(__file__).parent
 TESTS = [

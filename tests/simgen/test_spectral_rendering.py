@@ -1,16 +1,16 @@
 """Spectral mode against integration by colour-science: rendered views, thinned photons, exposures."""
 
-from pathlib import Path
+from typing import Any
 
-import lit_views
 import numpy as np
 import pytest
+from lit_scenes import SCALAR, build_scene, card, thinned
+from photon_statistics import counted
 
 from pcii.types import colour_index
 from simgen.dataset import capture_of
-from simgen.renderer import RenderScene, backend, build, render_view
-from simgen.sensor import sensitivities
-from simgen.spec import Recipe, Scene
+from simgen.renderer import RenderScene, render_view
+from simgen.spec import Recipe
 from simgen.spectral import patch_names
 from simgen.spectral.spectra import colour_science
 
@@ -39,29 +39,14 @@ def recipe(camera: str | None) -> Recipe:
 
 def chart(lamp: str, camera: str | None) -> tuple[RenderScene, Recipe]:
     """A ColorChecker that fills the view, each patch `SIDE_PX` pixels wide, evenly lit by `LUX`."""
-    side_mm = SIDE_PX * PIXEL_MM * 500 / 50
-    cards = [
-        {
-            "name": f"patch{number}",
-            "position_mm": (
-                (number % ACROSS - (ACROSS - 1) / 2) * side_mm,
-                (number // ACROSS - (DOWN - 1) / 2) * side_mm,
-                500,
-            ),
-            "shape": {"type": "card", "width_mm": side_mm, "height_mm": side_mm},
-            "material": {"reflectance": name},
-        }
-        for number, name in enumerate(patch_names())
-    ]
-    values = {
-        "title": "chart",
-        "objects": cards,
-        "lights": [{"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}],
-        "level": {"illuminance_lux": LUX, "z_mm": 500},
-    }
-    made = recipe(camera)
-    mi = backend.load(spectral=made.is_spectral)
-    return build(mi, Scene.model_validate(values), Path(), 2, sensitivities(made.sensor, Path())), made
+    side_mm, cards = SIDE_PX * PIXEL_MM * 500 / 50, list[dict[str, Any]]()
+    for number, name in enumerate(patch_names()):
+        down, right = divmod(number, ACROSS)
+        at_mm = (right - (ACROSS - 1) / 2) * side_mm, (down - (DOWN - 1) / 2) * side_mm
+        cards.append(card(500, side_mm, {"reflectance": name}, f"patch{number}", at_mm=at_mm))
+    light = {"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}
+    level = {"illuminance_lux": LUX, "z_mm": 500}
+    return build_scene(cards, [light], camera=camera, level=level), recipe(camera)
 
 
 def by_patch(image: np.ndarray) -> np.ndarray:
@@ -103,14 +88,14 @@ def test_thinned_photons_of_the_chart_are_those_of_spectral_integration() -> Non
     grid, gain = made.grid.camera_grid(), capture_of(made, built, made.seed).photons_per_radiance
     assert gain is not None
     # A few hundred photons a patch one by one, or some thousand where that is cheap.
-    gain *= 0.05 if lit_views.SCALAR else 0.5
-    photons, _ = lit_views.thinned(built, grid, gain, seed=2)
-    counts = np.zeros((grid.height, grid.width))
-    np.add.at(counts, (photons.i, photons.j), 1)
+    gain *= 0.05 if SCALAR else 0.5
+    counts = counted(thinned(built, grid, gain, seed=2)[0], grid)[0, 0]
     colours = colour_index(grid.height, grid.width, made.cfa)
-    own = np.stack([by_patch((counts * (colours == colour))[..., None])[:, 0] for colour in range(3)], axis=1)
+    means = np.stack(
+        [by_patch((counts * (colours == colour))[..., None])[:, 0] for colour in range(3)], axis=1
+    )
     inner = (SIDE_PX - 4) ** 2
-    found, expected = own * inner, integrated(CAMERAS[0], "FL2") * np.array([0.25, 0.5, 0.25])
+    found, expected = means * inner, integrated(CAMERAS[0], "FL2") * np.array([0.25, 0.5, 0.25])
     expected *= found.sum() / expected.sum()
     # Chi-square of 72 Poisson numbers, one of them given away for the sum; 5 deviations of it.
     surprise = ((found - expected) ** 2 / expected).sum()

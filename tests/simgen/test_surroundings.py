@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_scenes import ball
-from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
+from lit_scenes import EVENLY, SCALAR, ball, build_scene, card, film, seen, sky, surprise, thinned
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from simgen.truth import first_hits_of_view
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
-EVENLY = {"type": "uniform", "luminance_cd_m2": 1.0}
 WIDE = film(32, 32, focal_mm=10.0)
 """Sees 58 degrees to each side."""
 
@@ -36,7 +34,7 @@ def globe(height: int = 64) -> np.ndarray:
 
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0, -70.0])
 def test_the_camera_looks_at_the_middle_of_the_image(turn_deg: float, tmp_path: Path) -> None:
-    view = seen(made([], [sky(tmp_path, globe(), turn_deg=turn_deg)], folder=tmp_path), WIDE, 64)
+    view = seen(build_scene([], [sky(tmp_path, globe(), turn_deg=turn_deg)], folder=tmp_path), WIDE, 64)
     longitude, latitude = longitude_and_latitude()
     place = 0.5 + (longitude - turn_deg) / 360
     expected = np.stack([place, 0.5 + latitude / 180, 2 * np.abs(place - 0.5)], axis=-1)
@@ -52,7 +50,7 @@ def lit_side(folder: Path, row: slice, column: slice, **light: Any) -> np.ndarra
     """A matt ball, (H, W), where only a part of the image shines."""
     pixels = np.zeros((32, 64, 3))
     pixels[row, column] = 100
-    built = made([ball("ball", 0.0, 600.0, (1, 1, 1))], [sky(folder, pixels, **light)], folder=folder)
+    built = build_scene([ball("ball", 0.0, 600.0, (1, 1, 1))], [sky(folder, pixels, **light)], folder=folder)
     return seen(built, film(), 256)[8:24, 8:24].mean(axis=2)
 
 
@@ -83,7 +81,7 @@ DEPTH = 3
 @pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
 def test_an_image_of_ones_is_uniform_light(spectral: bool, tmp_path: Path) -> None:
     def lit(light: dict[str, Any], objects: list[dict[str, Any]]) -> Any:
-        return made(objects, [light], spectral=spectral, max_depth=2, folder=tmp_path)
+        return build_scene(objects, [light], spectral=spectral, max_depth=2, folder=tmp_path)
 
     ones = sky(tmp_path, np.ones((16, 32, 3)))
     # By itself: the renderer's table of D65 and ours differ by 0.1 %.
@@ -111,14 +109,14 @@ def sunny(height: int = 32) -> np.ndarray:
 
 
 def test_photons_in_the_sun_are_those_of_rendered_views(tmp_path: Path) -> None:
-    built = made(THINGS, [sky(tmp_path, sunny())], max_depth=DEPTH, folder=tmp_path)
+    built = build_scene(THINGS, [sky(tmp_path, sunny())], max_depth=DEPTH, folder=tmp_path)
     view = seen(built, film(), 512)
     gain = (5000 if SCALAR else 40_000) / view.sum() * 3
     photons, log = thinned(built, film(), gain)
     assert abs(surprise(photons, view, film(), gain)) < 5
     # The fault: the image is turned by six degrees.
     if not SCALAR:
-        turned = made(THINGS, [sky(tmp_path, sunny(), turn_deg=6.0)], max_depth=DEPTH, folder=tmp_path)
+        turned = build_scene(THINGS, [sky(tmp_path, sunny(), turn_deg=6.0)], max_depth=DEPTH, folder=tmp_path)
         assert surprise(photons, seen(turned, film(), 256), film(), gain) > 5
         assert log["paths_above_bound"] <= 1e-3 * photons.k.size
         # Followed by the surfaces' own scattering alone, a candidate in 25 would be kept.
@@ -129,7 +127,7 @@ def test_photons_in_the_sun_are_those_of_rendered_views(tmp_path: Path) -> None:
 def test_what_is_not_visible_lights_things_before_darkness(kind: str, tmp_path: Path) -> None:
     light = EVENLY if kind == "uniform" else sky(tmp_path, sunny())
     lights = light, light | {"visible": False}
-    shown, hidden = (made(THINGS[:2], [one], max_depth=DEPTH, folder=tmp_path) for one in lights)
+    shown, hidden = (build_scene(THINGS[:2], [one], max_depth=DEPTH, folder=tmp_path) for one in lights)
     lit, dark = seen(shown, film(), 64), seen(hidden, film(), 64)
     hits = first_hits_of_view(hidden, film(), 0, 0)
     is_whole = maximum_filter(hits.object_id, 3) == minimum_filter(hits.object_id, 3)

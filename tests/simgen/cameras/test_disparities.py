@@ -50,8 +50,7 @@ def test_even_shifts_leave_colours_out_and_another_pitch_mends_it() -> None:
     np.testing.assert_array_equal(shares_without(grid, "GRBG", z), [0.75, 0.5, 0.75])
     row, z_row = at_disparity(3.0, rows=1)  # columns mix, rows do not: two colours a row
     np.testing.assert_array_equal(shares_without(row, "GRBG", z_row), [0.5, 0, 0.5])
-    pitch = mending_pitch_mm(grid, [z])
-    assert pitch is not None
+    pitch: Any = mending_pitch_mm(grid, [z])
     assert not shares_without(replace(grid, pitch_mm=pitch), "GRBG", z).any()
     assert abs(pitch[0] - 5) < 1  # 4 px +- 1/3 mix four cameras: shifts of 6.5 px, say, round to 7
     assert mending_pitch_mm(replace(grid, rows=1), [z]) is None

@@ -1,20 +1,20 @@
 """Cameras as they really are: sheared, off their place, turned, with a lens; in every way of making data."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from lit_scenes import EVENLY, card, lit, two_balls
+from lit_scenes import EVENLY_30, build_scene, card, mosaics, two_balls
+from photon_statistics import counted, p_value
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from pcii.types import CameraGrid, mosaic
+from pcii.types import CameraGrid
 from simgen.cameras import Cameras, Rig, as_rig, rig_of
 from simgen.photons import Capture, thin_photons
-from simgen.renderer import RenderScene, backend, build, film_rays, render_view
+from simgen.renderer import RenderScene, backend, film_rays, render_view
 from simgen.sensor import PhotonTable
-from simgen.spec import Lens, Photons, Recipe, Scene
+from simgen.spec import Lens, Photons, Recipe
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
 pytestmark = pytest.mark.renders
@@ -27,8 +27,8 @@ LENS = Lens(aperture_mm=20.0, focus_mm=600.0)
 
 def dot(point_mm: tuple[float, float, float], side_mm: float = SIDE_MM) -> RenderScene:
     """A small white card, evenly lit, before a black wall."""
-    thing = card("dot", point_mm[2], side_mm, at_mm=point_mm[:2])
-    return lit([thing], [EVENLY], {"z_mm": 3000.0, "reflectance": (0, 0, 0)}, depth=2)
+    thing = card(point_mm[2], side_mm, at_mm=point_mm[:2])
+    return build_scene([thing], [EVENLY_30], backdrop={"z_mm": 3000.0, "reflectance": (0, 0, 0)})
 
 
 def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonTable:
@@ -60,11 +60,11 @@ def centres(scene: RenderScene, cameras: Cameras, k: int, l: int) -> dict[str, n
     image = render_view(scene, cameras, k, l, samples_per_pixel=256, seed=11).sum(axis=2)
     i, j = np.indices(image.shape)
     drawn = photons(scene, cameras, 1500)
-    own = (drawn.k == k) & (drawn.l == l)
+    here = (drawn.k == k) & (drawn.l == l)
     true = np.argwhere(first_hits_of_view(scene, cameras, k, l).object_id == 1)
     return {
         "dense": np.array([(i * image).sum(), (j * image).sum()]) / image.sum(),
-        "thinned": np.array([drawn.i[own].mean(), drawn.j[own].mean()]),
+        "thinned": np.array([drawn.i[here].mean(), drawn.j[here].mean()]),
         "truth": true.mean(axis=0),
     }
 
@@ -90,8 +90,8 @@ def recipe(**grid: object) -> Recipe:
 
 def test_errors_have_the_deviations_of_the_recipe() -> None:
     errors = {"position_sd_mm": (0.5, 0.2, 1.0), "rotation_sd_deg": (0.1, 0.3, 0.2), "pitch_error": 0.02}
-    own = recipe(rows=40, cols=40, errors=errors)
-    rig = rig_of(own.grid, own.seed)
+    wrong = recipe(rows=40, cols=40, errors=errors)
+    rig = rig_of(wrong.grid, wrong.seed)
     off_mm = rig.position_mm - 1.02 * as_rig(rig.grid).position_mm
     # 1600 cameras: a standard deviation is known to 1.8 %, a mean to 2.5 % of one.
     np.testing.assert_allclose(off_mm.std(axis=(0, 1)), (0.5, 0.2, 1.0), rtol=0.08)
@@ -99,10 +99,10 @@ def test_errors_have_the_deviations_of_the_recipe() -> None:
     angles = Rotation.from_matrix(rig.rotation.reshape(-1, 3, 3)).as_euler("xyz", degrees=True)
     np.testing.assert_allclose(angles.std(axis=0), (0.1, 0.3, 0.2), rtol=0.08)
     assert np.abs(np.corrcoef(np.column_stack([off_mm.reshape(-1, 3), angles]).T) - np.eye(6)).max() < 0.12
-    np.testing.assert_array_equal(rig_of(own.grid, own.seed).position_mm, rig.position_mm)
-    assert np.abs(rig.rotation - rig_of(own.grid, 6).rotation).max() > 0
+    np.testing.assert_array_equal(rig_of(wrong.grid, wrong.seed).position_mm, rig.position_mm)
+    assert np.abs(rig.rotation - rig_of(wrong.grid, 6).rotation).max() > 0
     # Each camera has its own stream: a row fewer changes nothing about the others.
-    fewer = rig_of(recipe(rows=39, cols=40, errors=errors).grid, own.seed)
+    fewer = rig_of(recipe(rows=39, cols=40, errors=errors).grid, wrong.seed)
     np.testing.assert_array_equal(fewer.rotation, rig.rotation[:39])
 
 
@@ -125,15 +125,8 @@ def test_rays_are_the_same_on_both_sides(lens: Lens | None) -> None:
     k, l = rng.integers(0, 3, 500), rng.integers(0, 2, 500)
     row_px, col_px = rng.uniform(0, 80, 500), rng.uniform(0, 89, 500)
     points = np.zeros((2, 500)) if lens is None else rig.lens_points(rng.random((2, 500)))
-    ray = film_rays(
-        scene,
-        rig,
-        mi.UInt32(k),
-        mi.UInt32(l),
-        mi.Float(row_px),
-        mi.Float(col_px),
-        None if lens is None else mi.Point2f(points),
-    )
+    on_film = mi.UInt32(k), mi.UInt32(l), mi.Float(row_px), mi.Float(col_px)
+    ray = film_rays(scene, rig, *on_film, None if lens is None else mi.Point2f(points))
     origin, direction = rig.rays(k, l, row_px, col_px, points)
     # Single precision: eight digits of film points up to 90 px, of places of some 10 mm.
     np.testing.assert_allclose(np.array(ray.d).T, direction, atol=1e-6)
@@ -174,17 +167,15 @@ def test_the_circle_of_confusion_has_the_size_of_the_formula(where: str) -> None
 
 
 def test_a_lens_leaves_an_even_field_as_bright_as_a_pinhole() -> None:
-    values = {"title": "even", "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}]}
-    scene = build(backend.load(), Scene.model_validate(values), Path(), 2)
+    scene = build_scene([], [{"type": "uniform", "luminance_cd_m2": 100.0}])
     wide = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=3.0, pixel_mm=0.1, height=41, width=40)
     rig = replace(as_rig(wide), lens=Lens(aperture_mm=4.0, focus_mm=300.0))
     image = render_view(scene, rig, 0, 0, samples_per_pixel=4, seed=1)
     np.testing.assert_allclose(image, 100.0, rtol=1e-5)  # corners, 44 degrees off the axis, too
     drawn, _ = thin_photons(Capture(scene, rig, None, Photons(scope="exposure"), 0.1, seed=1))
-    counts = np.bincount(drawn.i * 40 + drawn.j, minlength=1640)
+    counts = counted(drawn, wide)
     assert abs(counts.mean() / 10 - 1) < 4 / np.sqrt(16_400)
-    chi_square = ((counts - 10.0) ** 2 / 10.0).sum()
-    assert 1e-3 < stats.chi2.sf(chi_square, 1640) < 1 - 1e-3
+    assert 1e-3 < p_value(counts, np.array(10.0)) < 1 - 1e-3
 
 
 BALLS = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=33, width=31)
@@ -200,25 +191,15 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
     scene, rig, budget = two_balls(), WRONG[name], 4000
     pinholes = replace(rig, lens=None) if rig.lens else replace(rig, grid=BALLS)
 
+    def in_blocks(pixels: np.ndarray) -> np.ndarray:
+        """Of 4 x 4 pixels and what is left at the border: tens of photons at least."""
+        return np.add.reduceat(np.add.reduceat(pixels, range(0, 33, 4), axis=1), range(0, 31, 4), axis=2)
+
     def rates(cameras: Cameras) -> np.ndarray:
-        views = [
-            render_view(scene, cameras, k, l, samples_per_pixel=256, seed=7 + 2 * k + l)
-            for k, l in np.ndindex(2, 2)
-        ]
-        radiance = mosaic(np.stack(views).astype(np.float64), "GRBG")
-        return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
+        radiance = mosaics(scene, cameras, 256, seed=7)
+        return in_blocks(budget * radiance / radiance.sum(axis=(1, 2), keepdims=True))
 
     drawn, _ = thin_photons(Capture(scene, rig, "GRBG", Photons(budget=budget), seed=3))
-    counts = np.zeros((4, 33, 31))
-    np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
-
-    def p_value(expected: np.ndarray) -> float:
-        # Blocks of 4 x 4 pixels and what is left at the border: tens of photons at least.
-        blocks = [
-            np.add.reduceat(np.add.reduceat(part, range(0, 33, 4), axis=1), range(0, 31, 4), axis=2)
-            for part in (counts, expected)
-        ]
-        return float(stats.chi2.sf(((blocks[0] - blocks[1]) ** 2 / blocks[1]).sum(), blocks[0].size))
-
-    assert p_value(rates(rig)) > 1e-3
-    assert p_value(rates(pinholes)) < 1e-6
+    counts = in_blocks(counted(drawn, BALLS).reshape(4, 33, 31))
+    assert p_value(counts, rates(rig)) > 1e-3
+    assert p_value(counts, rates(pinholes)) < 1e-6

@@ -11,7 +11,7 @@ from digests import digest
 from tiny import GRID_2_X_3
 
 from pcii.base import Executor, InputError, WorkerLostError, command_line, locked
-from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, software, verify
+from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, open_dataset, software, verify
 from simgen.app import commands as cli
 from simgen.dataset import dataset_collection, generate, generate_collection
 from simgen.spec import Sweep, load_recipe, load_sweep
@@ -60,9 +60,8 @@ def test_each_dataset_is_what_its_recipe_alone_gives(
 ) -> None:
     recipe, near = load_recipe(str(recipe_file), ["seed=9", "photons.budget=200"])
     manifest = generate(recipe, near, tmp_path / "alone")
-    number = [row["path"] for row in open_collection(collection).rows].index("budget_200_seed_9")
     assert digest(tmp_path / "alone") == digest(collection / "budget_200_seed_9")
-    assert open_collection(collection)[number].manifest["identity"] == manifest["identity"]
+    assert open_dataset(collection / "budget_200_seed_9").manifest["identity"] == manifest["identity"]
 
 
 def test_what_is_finished_is_left_alone_and_what_is_missing_is_made(
@@ -102,34 +101,25 @@ def test_a_dataset_that_cannot_be_made_holds_up_no_other(
     assert [row["seed"] for row in open_collection(out).rows] == [7, 9]
 
 
-def test_a_collection_that_another_run_writes_is_refused(recipe_file: Path, tmp_path: Path) -> None:
-    with (
-        locked(tmp_path / dataset_collection.LOCK, tmp_path),
-        pytest.raises(InputError, match="another run writes here"),
-    ):
-        generate_collection(sweep_of(recipe_file), tmp_path)
-
-
-def test_another_recipe_a_dataset_and_a_file_are_refused(
-    recipe_file: Path, collection: Path, tmp_path: Path
+def test_what_is_not_this_collection_is_refused(
+    recipe_file: Path, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(InputError, match="collection of another recipe"):
-        generate_collection(sweep_of(recipe_file, 3, "grid.cols=2"), collection)
-    with pytest.raises(InputError, match="another recipe"):
-        generate_collection(load_sweep(str(recipe_file)), collection)
-    with pytest.raises(InputError, match="holds a single dataset"):
-        generate_collection(sweep_of(recipe_file), collection / "budget_100_seed_7")
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="this is a file"):
-        generate_collection(sweep_of(recipe_file), tmp_path / "file")
+    for sweep, out, message in (
+        (sweep_of(recipe_file, 3, "grid.cols=2"), collection, "collection of another recipe"),
+        (load_sweep(str(recipe_file)), collection, "another recipe"),
+        (sweep_of(recipe_file), collection / "budget_100_seed_7", "holds a single dataset"),
+        (sweep_of(recipe_file), tmp_path / "file", "this is a file"),
+    ):
+        with pytest.raises(InputError, match=message):
+            generate_collection(sweep, out)
     recipe, near = load_recipe(str(recipe_file), ["photons.budget=5"])
     with pytest.raises(InputError, match="holds something else"):
         generate(recipe, near, collection)
-
-
-def test_other_software_does_not_extend_a_collection(
-    recipe_file: Path, collection: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    (tmp_path / "busy").mkdir()
+    lock = locked(tmp_path / "busy" / dataset_collection.LOCK, tmp_path / "busy")
+    with lock, pytest.raises(InputError, match="another run writes here"):
+        generate_collection(sweep_of(recipe_file), tmp_path / "busy")
     original = software.version
     monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):

@@ -3,11 +3,14 @@
 import fcntl
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 import zarr
 from digests import digest
+from lit_scenes import EVENLY, card
 from stored_datasets import flip_a_bit, one_sentence
 from tiny import TINY_RECIPE
 from zarr.storage import ZipStore
@@ -47,13 +50,11 @@ def test_a_dataset_explains_itself_and_agrees_with_its_recipe(made: Path) -> Non
     assert set(manifest["files"]) == set(digest(made))
     assert not (made / MARKER).exists()
     assert verify(made) == len(manifest["files"])
-    dataset = open_dataset(made)
+    dataset: Any = open_dataset(made)
     assert (dataset.grid.shape_KLHW, dataset.cfa) == ((2, 3, 64, 60), "GRBG")
     # Six views of 200 photons: a Poisson total, within 5 standard deviations.
     assert abs(dataset.counts.total - 1200) < 5 * np.sqrt(1200)
-    assert dataset.truth is not None
     assert set(np.unique(dataset.truth.object_id)) == {0, 1, 2}
-    assert dataset.views is not None
     assert dataset.views.view(1, 2).shape == (64, 60, 1)
 
 
@@ -124,30 +125,25 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
     assert digest(out) == digest(made)
 
 
-def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_finished_dataset_is_left_alone_and_one_that_another_run_writes(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Prepared, "render_scene", lambda _: pytest.fail("rendered again"))
     before = (made / MANIFEST).stat().st_mtime_ns
     generate(recipe(), Path(), made)
     assert (made / MANIFEST).stat().st_mtime_ns == before
-
-
-def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    with (tmp_path / "out" / MARKER).open("a") as file:
+    with (tmp_path / MARKER).open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         with pytest.raises(InputError, match="another run writes here"):
-            generate(recipe(), Path(), tmp_path / "out")
+            generate(recipe(), Path(), tmp_path)
 
 
 def test_a_scene_that_cannot_be_loaded_leaves_no_folder_behind(tmp_path: Path) -> None:
-    (tmp_path / "scene").mkdir()
+    for folder in ("scene", "empty"):
+        (tmp_path / folder).mkdir()
+    values = {"title": "bad", "lights": [EVENLY], "objects": [card(500, 9.0, {"texture": "a.png"})]}
+    (tmp_path / "scene" / "scene.toml").write_text(tomli_w.dumps(values))
     (tmp_path / "scene" / "a.png").write_text("no picture")
-    (tmp_path / "scene" / "scene.toml").write_text(
-        'title = "bad"\n[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 1.0\n[[objects]]\nname = "card"\n'
-        'position_mm = [0, 0, 500]\nmaterial = { texture = "a.png" }\n'
-        'shape = { type = "card", width_mm = 9.0, height_mm = 9.0 }\n'
-    )
-    (tmp_path / "empty").mkdir()
     for out in (tmp_path / "new" / "deep" / "out", tmp_path / "empty"):
         with pytest.raises(InputError, match="not a PNG"):
             generate(recipe(scene=str(tmp_path / "scene")), Path(), out)
@@ -206,7 +202,7 @@ def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_pa
     truth, rig = zarr.open_group(tmp_path / "wrong" / TRUTH, mode="r"), rig_of(wrong.grid, wrong.seed)
     np.testing.assert_array_equal(np.asarray(truth["camera_position_mm"]), rig.position_mm)
     np.testing.assert_array_equal(np.asarray(truth["camera_rotation"]), rig.rotation)
-    own, perfect = digest(tmp_path / "wrong"), digest(made)
-    same = {name for name in perfect if own[name] == perfect[name]}
+    off, perfect = digest(tmp_path / "wrong"), digest(made)
+    same = {name for name in perfect if off[name] == perfect[name]}
     assert any(name.startswith(f"{TRUTH}/z_mm/c/") for name in same)  # the virtual centre has no errors
     assert not any(name.startswith((f"{TRUTH}/view_z_mm/c/", RADIANCE)) for name in same)

@@ -1,4 +1,4 @@
-"""What identifies a dataset: all that may change its bytes, and nothing else."""
+"""What a recipe and its scene decide before any work: identity, noise, and depths to look at."""
 
 from pathlib import Path
 from typing import Any
@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+import zarr
+from tiny import TINY_RECIPE
 
-from pcii.store import software
-from simgen.dataset import prepare
-from simgen.spec import Recipe
+from pcii.store import TRUTH, software
+from simgen.dataset import Prepared, generate, prepare
+from simgen.spec import Analysis, Recipe
 
 Table = dict[str, Any]
 
@@ -32,16 +34,20 @@ RECIPE: Table = {
     "photons": {"budget": 500.0, "nested": [100.0, 200.0]},
     "analysis": {"z_mm": [500.0], "z_range_mm": [400.0, 700.0]},
 }
-CHANGES: list[tuple[str, Any]] = [
-    ("title", "other words"),
-    ("seed", 1),
-    ("grid.errors.pitch_error", 0.001),
-    ("sensor.bits", 9),
-    ("photons.nested", [100.0]),
-    ("analysis.z_mm", [501.0]),
-    ("products.view_truth", ["z_mm"]),
-    ("render.samples_per_pixel", 17),
+OTHER_WORK: list[tuple[str, Any, bool]] = [
+    ("title", "other words", False),
+    ("photons.nested", [100.0], False),
+    ("analysis.z_mm", [501.0], False),
+    ("products.view_truth", ["z_mm"], False),
+    ("seed", 1, True),
+    ("photons.budget", 501.0, True),
+    ("grid.rows", 3, True),
+    ("grid.errors.pitch_error", 0.001, True),
+    ("sensor.bits", 9, False),
+    ("sensor.dark_counts", 1e-3, True),
+    ("render.max_depth", 4, True),
 ]
+"""Changes of a recipe, and whether its photons have noise of their own."""
 
 
 @pytest.fixture
@@ -49,16 +55,20 @@ def near(tmp_path: Path) -> Path:
     """Folder of a recipe and of its scene with files."""
     (tmp_path / "here").mkdir()
     for name in ("a.png", "a.ply", "a.exr"):
-        (tmp_path / "here" / name).write_bytes(b"nobody decodes this, and every byte counts")
+        (tmp_path / "here" / name).write_bytes(b"any byte")
     np.save(tmp_path / "a.npy", np.ones((4, 5)))
     (tmp_path / "a.csv").write_text("wavelength_nm,R,G,B\n400,0,0,1\n550,0,1,0\n700,1,0,0\n")
     return tmp_path
 
 
-def identity(near: Path, recipe: Table, scene: Table | None = None) -> str:
+def prepared(near: Path, recipe: Table, scene: Table | None = None) -> Prepared:
     if scene is not None:
         (near / "here" / "scene.toml").write_text(tomli_w.dumps(scene))
-    return prepare(Recipe.model_validate(recipe), near).identity
+    return prepare(Recipe.model_validate(recipe), near)
+
+
+def identity(near: Path, recipe: Table, scene: Table | None = None) -> str:
+    return prepared(near, recipe, scene).identity
 
 
 def changed(values: Table, field: str, value: Any) -> Table:
@@ -67,22 +77,26 @@ def changed(values: Table, field: str, value: Any) -> Table:
     return values | {first: changed(values.get(first, {}), rest, value) if rest else value}
 
 
-@pytest.mark.parametrize(("field", "value"), CHANGES)
-def test_every_table_of_a_recipe_is_part_of_the_identity(near: Path, field: str, value: Any) -> None:
-    before = identity(near, RECIPE, SCENE)
-    assert identity(near, changed(RECIPE, field, value)) != before
+@pytest.mark.parametrize(("field", "value", "is_another_draw"), OTHER_WORK)
+def test_every_table_of_a_recipe_is_part_of_the_identity_and_some_of_the_noise(
+    near: Path, field: str, value: Any, is_another_draw: bool
+) -> None:
+    recipe = changed(RECIPE, "sensor.hot_pixels", None)  # which would have the size of other films
+    before, after = prepared(near, recipe, SCENE), prepared(near, changed(recipe, field, value))
+    assert after.identity != before.identity
+    assert (after.seed != before.seed) == is_another_draw
 
 
 def test_a_scenes_values_are_part_of_the_identity_and_terms_of_use_are_not(near: Path) -> None:
-    before = identity(near, RECIPE, SCENE)
-    assert identity(near, changed(RECIPE, "publication.licence", "CC0-1.0")) == before
-    assert identity(near, RECIPE, SCENE | {"title": "other words"}) != before
-    unscored = SCENE | {"objects": [thing | {"scored": False} for thing in SCENE["objects"]]}
-    seeds = {prepare(Recipe.model_validate(RECIPE), near).seed}
-    assert identity(near, RECIPE, unscored) != before
-    assert seeds == {prepare(Recipe.model_validate(RECIPE), near).seed}  # of the same photons
+    before = prepared(near, RECIPE, SCENE)
+    assert identity(near, changed(RECIPE, "publication.licence", "CC0-1.0")) == before.identity
     lamp = SCENE["lights"][0] | {"luminance_cd_m2": 100.1}
-    assert identity(near, RECIPE, SCENE | {"lights": [lamp]}) != before
+    unscored = [thing | {"scored": False} for thing in SCENE["objects"]]
+    changes = {"title": "other words", "objects": unscored, "planes_mm": [500.0], "lights": [lamp]}
+    for field, value in changes.items():
+        after = prepared(near, RECIPE, SCENE | {field: value})
+        assert after.identity != before.identity
+        assert (after.seed != before.seed) == (field == "lights")  # photons of the others are the same
 
 
 def test_every_byte_of_a_scenes_files_is_part_of_the_identity(near: Path) -> None:
@@ -116,7 +130,34 @@ def test_defaults_and_whole_numbers_may_be_written_out(near: Path) -> None:
     long = {"scene": "here", "title": "", "seed": 0, "photons": {"budget": 3.0e2, "statistics": "poisson"}}
     before = identity(near, short, PLAIN | {"backdrop": {"z_mm": 900}})
     assert identity(near, long) == before
-    assert (
-        identity(near, long, PLAIN | {"objects": [], "backdrop": {"half_width_mm": 5e3, "z_mm": 900.0}})
-        == before
-    )
+    backdrop = {"half_width_mm": 5e3, "z_mm": 900.0}
+    assert identity(near, long, PLAIN | {"objects": [], "backdrop": backdrop}) == before
+
+
+@pytest.mark.parametrize(
+    ("planes_mm", "of_recipe", "expected"),
+    [
+        ([], {}, {}),
+        ([620, 540], {}, {"z_mm": [620, 540], "z_range_mm": [480, 680]}),
+        ([80], {}, {"z_mm": [80], "z_range_mm": [40, 140]}),
+        ([540], {"z_range_mm": [500, 501]}, {"z_mm": [540], "z_range_mm": [500, 501]}),
+        ([540], {"z_mm": [550]}, {"z_mm": [550]}),
+    ],
+)
+def test_the_scenes_planes_are_looked_at_where_the_recipe_names_none(
+    planes_mm: list[float], of_recipe: Table, expected: Table, near: Path
+) -> None:
+    found = prepared(near, {"scene": "here", "analysis": of_recipe}, PLAIN | {"planes_mm": planes_mm})
+    assert found.recipe.analysis == Analysis.model_validate(expected)
+
+
+@pytest.mark.renders
+def test_a_dataset_of_a_drawn_scene_has_its_planes(tmp_path: Path) -> None:
+    recipe = TINY_RECIPE | {"scene": "drawn_room", "scene_number": 17, "photons": {"budget": 50}}
+    manifest = generate(Recipe.model_validate(recipe), Path(), tmp_path / "data")
+    planes = [480.0, 585.0, 680.0, 760.0]
+    assert manifest["analysis"] == {"z_mm": planes, "z_range_mm": [420.0, 820.0]}
+    assert manifest["recipe"]["analysis"] == manifest["analysis"]
+    assert manifest["title"] == "Drawn: room 17"
+    truth = zarr.open_group(tmp_path / "data" / TRUTH, mode="r")
+    assert truth["in_focus"].shape[0] == len(planes)  # type: ignore[union-attr]

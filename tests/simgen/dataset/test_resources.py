@@ -3,7 +3,8 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -38,8 +39,7 @@ def test_what_does_not_fit_is_named_by_its_field(values: dict[str, Any], field: 
     plan = None if field == "grid.rows" else THINS  # whose photons grow with the views
     if field == "photons.budget":
         plan = replace(THINS, photons_per_view=1e6)
-    sentence = shortage(recipe(**values), plan, ROOM)
-    assert sentence is not None
+    sentence: Any = shortage(recipe(**values), plan, ROOM)
     assert sentence.startswith(field)
     assert (shortage(recipe(), THINS, ROOM, map_counts=1e8) or "").startswith("sensor.hot_pixels")
     assert "this machine has 8 GB available" in sentence
@@ -53,17 +53,11 @@ def test_ordinary_recipes_fit() -> None:
     assert peak_bytes(recipe(), bright) == 4e8 + 200 * 100 * 1024**2
 
 
-class Usage(NamedTuple):
-    """A disk with so much room."""
-
-    free: float
-
-
 def test_a_disk_that_is_too_small_is_named_unless_views_are_there(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     wanted = recipe(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(6e8))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=6e8))
     with pytest.raises(InputError, match=r"products\.radiance: rendered views .* 630 MB .* has 600 MB left"):
         check_resources(wanted, None, tmp_path / "new" / "out")
     check_resources(recipe(), None, tmp_path / "out")

@@ -4,7 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 from digests import digest
+from lit_scenes import EVENLY, card
 from tiny import GRID_2_X_2
 
 from pcii.base import silent
@@ -65,13 +67,11 @@ def test_only_what_depends_on_a_change_is_made_again(
 
 
 def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -> None:
-    scene = tmp_path / "own"
+    scene = tmp_path / "mine"
     scene.mkdir()
-    (scene / "scene.toml").write_text(
-        'title = "one card"\n[[objects]]\nname = "card"\nposition_mm = [0.0, 0.0, 500.0]\n'
-        'shape = { type = "mesh", file = "card.obj" }\nmaterial = { reflectance = [0.5, 0.5, 0.5] }\n'
-        '[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 100.0\n'
-    )
+    thing = card(500, 0, {"reflectance": [0.5, 0.5, 0.5]}) | {"shape": {"type": "mesh", "file": "card.obj"}}
+    values = {"title": "one card", "objects": [thing], "lights": [EVENLY]}
+    (scene / "scene.toml").write_text(tomli_w.dumps(values))
     reuse, digests = Reuse(), set[str]()
     for size in (30, 60):
         corners = "\n".join(f"v {x * size} {y * size} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))

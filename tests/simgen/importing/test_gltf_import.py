@@ -1,18 +1,20 @@
-"""glTF files as scenes: where things stand, what they look like, and what is said of the rest."""
+"""glTF files as scenes: where things stand, what they look like, and what is reported of the rest."""
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from gltf_draft import QUAD, QUAD_UV, GltfDraft
+from lit_scenes import film
 from PIL import Image
+from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial.transform import Rotation
 
 from pcii.base import InputError, linear_to_srgb, srgb_to_linear
-from pcii.types import CameraGrid
 from simgen.assets import read_assets, triangles_of
 from simgen.importing import import_scene
 from simgen.renderer import backend, build, render_view
@@ -30,8 +32,8 @@ def imported(draft: GltfDraft, folder: Path, **options: Any) -> tuple[Scene, tup
     for material in draft.json.get("materials", []):
         material.setdefault("doubleSided", True)
     (folder / "file.glb").write_bytes(draft.glb())
-    said = import_scene(folder / "file.glb", folder / "scene", **options)
-    return load_scene(str(folder / "scene")), said.left_out
+    report = import_scene(folder / "file.glb", folder / "scene", **options)
+    return load_scene(str(folder / "scene")), report.left_out
 
 
 def corners_mm(scene: Scene, folder: Path, name: str) -> np.ndarray:
@@ -72,10 +74,8 @@ def test_everything_stands_where_the_file_says(tmp_path: Path) -> None:
     draft = GltfDraft()
     mesh = draft.mesh(TETRAHEDRON, TETRAHEDRON_FACES)
     outer = affine(turn(5, -20, 15), (0.3, 0.2, -0.1))
-    children = [
-        draft.node(root=False, mesh=mesh, name=name, matrix=by_columns(place))
-        for name, place in PLACES.items()
-    ]
+    placed = {"root": False, "mesh": mesh}
+    children = [draft.node(name=name, matrix=by_columns(place), **placed) for name, place in PLACES.items()]
     draft.node(name="group", matrix=by_columns(outer), children=children)
     eye = affine(turn(8, 12, -5), (0.05, 0.1, 0.2))
     draft.camera(matrix=by_columns(eye @ np.diag([2.0, 2.0, 2.0, 1.0])), yfov=0.5, aspect=1.5)
@@ -102,7 +102,7 @@ def test_the_outside_stays_outside(tmp_path: Path, place: str) -> None:
     draft.camera()
     scene, _ = imported(draft, tmp_path)
     built = build(backend.load(), scene, tmp_path / "scene", 2)
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=0.4, height=64, width=64)
+    grid = film(64, 64, focal_mm=125)
     hit = first_hits_at_centre(built, grid).object_id == 1
     assert hit.sum() > 50
     view = render_view(built, grid, 0, 0, samples_per_pixel=1, seed=1)
@@ -145,10 +145,9 @@ def test_lights_keep_their_candela_and_lux(tmp_path: Path) -> None:
     draft.light({"type": "spot", "intensity": 7.0, "spot": cone}, translation=[0, 1, -1], **down)
     draft.light({"type": "point", "intensity": 0.0})
     scene, _ = imported(draft, tmp_path)
-    point, sun, spot = scene.lights
-    assert point.type == "point"
-    assert sun.type == "directional"
-    assert spot.type == "spot"
+    lights: Any = scene.lights
+    point, sun, spot = lights
+    assert [light.type for light in lights] == ["point", "directional", "spot"]
     assert point.position_mm == (100.0, -200.0, 300.0)
     assert point.intensity_cd == pytest.approx(10 * (0.2126 + 0.7152 / 2 + 0.0722 / 4))
     assert point.illuminant == pytest.approx(linear_to_srgb(np.array([1, 0.5, 0.25])), abs=1e-6)
@@ -180,11 +179,9 @@ def test_emission_in_watts_has_blenders_ratio_to_its_lights(tmp_path: Path) -> N
     for unit, factor in (("watt", 1.0), ("nit", 683.0)):
         options = {} if unit == "nit" else {"emission_unit": unit}
         scene, left_out = imported(draft, tmp_path / unit, **options)
-        emission = scene.objects[0].material.emission
-        bulb, sun = scene.lights
-        assert emission is not None
-        assert bulb.type == "point"
-        assert sun.type == "directional"
+        emission: Any = scene.objects[0].material.emission
+        lights: Any = scene.lights
+        bulb, sun = lights
         per_m2 = emission.luminance_cd_m2 / bulb.intensity_cd
         assert per_m2 == pytest.approx(strength / (watts / (4 * np.pi)) / factor, rel=1e-6)
         per_sr = emission.luminance_cd_m2 / sun.illuminance_lux
@@ -215,24 +212,21 @@ def material_of(
 
 
 def test_numbers_of_materials(tmp_path: Path) -> None:
-    made, left_out = material_of(
-        {
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.5, 0.25, 1.0, 1.0],
-                "metallicFactor": 0.25,
-                "roughnessFactor": 0.4,
-            },
-            "emissiveFactor": [2.0, 1.0, 0.0],  # above 1, as before KHR_materials_emissive_strength
-            "extensions": {
-                "KHR_materials_transmission": {"transmissionFactor": 0.3},
-                "KHR_materials_ior": {"ior": 1.4},
-                "KHR_materials_clearcoat": {"clearcoatFactor": 0.6, "clearcoatRoughnessFactor": 0.2},
-                "KHR_materials_emissive_strength": {"emissiveStrength": 40.0},
-                "KHR_materials_sheen": {},
-            },
+    material = {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.5, 0.25, 1.0, 1.0],
+            "metallicFactor": 0.25,
+            "roughnessFactor": 0.4,
         },
-        tmp_path,
-    )
+        "emissiveFactor": [2.0, 1.0, 0.0],  # above 1, as before KHR_materials_emissive_strength
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 0.3},
+            "KHR_materials_ior": {"ior": 1.4},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.6, "clearcoatRoughnessFactor": 0.2},
+            "KHR_materials_emissive_strength": {"emissiveStrength": 40.0},
+        },
+    }
+    made, _ = material_of(material, tmp_path)
     assert made.reflectance == pytest.approx(linear_to_srgb(np.array([0.5, 0.25, 1.0])), abs=1e-6)
     finish = made.finish
     assert (finish.metallic, finish.roughness, finish.transmission) == (0.25, 0.4, 0.3)
@@ -240,14 +234,9 @@ def test_numbers_of_materials(tmp_path: Path) -> None:
     # The widths of the coat's highlights agree: alpha is 0.2^2, and 0.1 to 0.001 over the gloss.
     assert 0.1 + finish.clearcoat_gloss * (0.001 - 0.1) == pytest.approx(0.04, abs=1e-6)
     assert made.emission.luminance_cd_m2 == pytest.approx(80 * (0.2126 + 0.7152 / 2))
-    assert left_out[0] == "KHR_materials_sheen"
-
-
-def test_the_specular_factor_is_the_strength_of_highlights(tmp_path: Path) -> None:
-    """At normal incidence ((n - 1) / (n + 1))^2 times the factor."""
     specular = {"KHR_materials_specular": {"specularFactor": 0.25}}
-    made, _ = material_of({"extensions": specular}, tmp_path)
-    n = made.finish.refractive_index
+    made, _ = material_of({"extensions": specular}, tmp_path / "glossy")
+    n = made.finish.refractive_index  # at normal incidence ((n - 1) / (n + 1))^2 times the factor
     assert ((n - 1) / (n + 1)) ** 2 == pytest.approx(0.04 * 0.25, rel=1e-4)
 
 
@@ -257,20 +246,14 @@ def test_pictures_are_split_and_multiplied(tmp_path: Path) -> None:
     packed = RNG.integers(0, 256, (4, 4, 3), dtype=np.uint8)
     tilts = np.full((4, 4, 3), (128, 128, 255), np.uint8)
     colour, numbers, tilt = (draft.texture(png(pixels)) for pixels in (colours, packed, tilts))
-    made, left_out = material_of(
-        {
-            "pbrMetallicRoughness": {
-                "baseColorTexture": {"index": colour},
-                "baseColorFactor": [1.0, 0.5, 0.25, 1.0],
-                "metallicRoughnessTexture": {"index": numbers},
-                "metallicFactor": 0.5,
-            },
-            "normalTexture": {"index": tilt},
-            "occlusionTexture": {"index": numbers},
-        },
-        tmp_path,
-        draft,
-    )
+    numbers_of_surface = {
+        "baseColorTexture": {"index": colour},
+        "baseColorFactor": [1.0, 0.5, 0.25, 1.0],
+        "metallicRoughnessTexture": {"index": numbers},
+        "metallicFactor": 0.5,
+    }
+    material = {"pbrMetallicRoughness": numbers_of_surface, "normalTexture": {"index": tilt}}
+    made, left_out = material_of(material, tmp_path, draft)
     folder = tmp_path / "scene"
     linear = srgb_to_linear(pixels_of(folder, made.texture) / 255)
     expected = srgb_to_linear(colours / 255) * [1, 0.5, 0.25]
@@ -279,7 +262,7 @@ def test_pictures_are_split_and_multiplied(tmp_path: Path) -> None:
     np.testing.assert_array_equal(pixels_of(folder, made.finish.roughness), packed[..., 1])
     np.testing.assert_allclose(pixels_of(folder, made.finish.metallic), packed[..., 2] / 2, atol=0.5)
     np.testing.assert_array_equal(pixels_of(folder, made.normal_map), tilts)
-    assert left_out == ("occlusionTexture",)
+    assert left_out == ()
 
 
 @pytest.mark.parametrize(("mode", "cutoff"), [("MASK", 0.3), ("BLEND", 0.5)])
@@ -299,13 +282,8 @@ def test_alpha_cuts_holes(tmp_path: Path, mode: str, cutoff: float) -> None:
     assert opaque.opacity is None
 
 
-QUARTERS = np.zeros((16, 16, 3), np.uint8)
-QUARTERS[:8, :8], QUARTERS[:8, 8:], QUARTERS[8:, :8], QUARTERS[8:, 8:] = (
-    (255, 0, 0),
-    (0, 255, 0),
-    (0, 0, 255),
-    (255, 255, 255),
-)
+COLOURS = np.array([[(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 255)]], np.uint8)
+QUARTERS = COLOURS.repeat(8, axis=0).repeat(8, axis=1)
 LETTERS = {(True, False, False): "R", (False, True, False): "G", (False, False, True): "B", (True,) * 3: "W"}
 
 
@@ -329,7 +307,7 @@ def test_pictures_lie_as_in_the_file(tmp_path: Path, transform: dict[str, Any], 
     draft.camera()
     scene, _ = imported(draft, tmp_path)
     built = build(backend.load(), scene, tmp_path / "scene", 2)
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=80, pixel_mm=10, height=4, width=4)
+    grid = film(4, 4, focal_mm=8)
     view = render_view(built, grid, 0, 0, samples_per_pixel=64, seed=1)
     found = [[LETTERS[tuple((view[i, j] > 0.5 * view.max()).tolist())] for j in (1, 2)] for i in (1, 2)]
     assert " ".join("".join(row) for row in found) == seen
@@ -364,11 +342,8 @@ def test_parts_of_a_mesh_are_objects_named_by_their_materials(tmp_path: Path) ->
         imported(draft, tmp_path, unscored=["table-001"], **place)
     scene, left_out = imported(draft, tmp_path, unscored=["table-001-4", "table-001-oak-2"], **place)
     assert [thing.scored for thing in scene.objects] == [True, True, False, False, True, True]
-    names = [thing.name for thing in scene.objects]
-    assert names == [
-        *("table-001-oak", "table-001-steel", "table-001-4"),
-        *("table-001-oak-2", "table-001-steel-2", "table-001-4-2"),
-    ]
+    parts = "table-001-oak", "table-001-steel", "table-001-4"
+    assert [thing.name for thing in scene.objects] == [*parts, *(f"{name}-2" for name in parts)]
     assert "points and lines, which have no surface" in left_out
     assert len(list((tmp_path / "scene").glob("*.ply"))) == 3
 
@@ -461,11 +436,34 @@ def test_copies_and_skins_stand_where_the_file_says(tmp_path: Path) -> None:
     to_ours = np.array([1000, -1000, -1000])
     for number in range(2):
         expected = (TETRAHEDRON * sizes[number] + moves[number] + [0, 1, 0]) * to_ours
-        np.testing.assert_allclose(
-            corners_mm(scene, tmp_path / "scene", f"post-{number + 1}"), expected, atol=1e-3
-        )
-    np.testing.assert_allclose(
-        corners_mm(scene, tmp_path / "scene", "body"),
-        (TETRAHEDRON + np.array([0, 0, 3])) * to_ours,
-        atol=1e-3,
-    )
+        found = corners_mm(scene, tmp_path / "scene", f"post-{number + 1}")
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    found = corners_mm(scene, tmp_path / "scene", "body")
+    np.testing.assert_allclose(found, (TETRAHEDRON + np.array([0, 0, 3])) * to_ours, atol=1e-3)
+
+
+BY_BLENDER = Path(__file__).parent / "by_blender"
+
+
+@pytest.mark.renders
+def test_depth_and_objects_are_those_that_blender_sees(tmp_path: Path) -> None:
+    report = import_scene(BY_BLENDER / "scene.glb", tmp_path / "scene")
+    assert (report.objects, report.lights, report.camera, report.left_out) == (6, 2, "Cam", ())
+    scene = load_scene(str(tmp_path / "scene"))
+    casts = np.load(BY_BLENDER / "casts.npz")
+    size = len(casts["z_mm"])
+    grid = replace(film(size, size), pixel_mm=36 / size)
+    hits = first_hits_at_centre(build(backend.load(), scene, tmp_path / "scene", 2), grid)
+    names = np.array(["", *(thing.name for thing in scene.objects)])
+    theirs = np.char.replace(casts["name"], ".", "-")
+    assert set(theirs.ravel()) == set(names)
+    numbers = np.unique(theirs, return_inverse=True)[1].reshape(theirs.shape)
+    inside = maximum_filter(numbers, 3) == minimum_filter(numbers, 3)
+    assert inside.mean() > 0.8
+    np.testing.assert_array_equal(names[hits.object_id][inside], theirs[inside])
+    there = inside & np.isfinite(casts["z_mm"])
+    assert np.abs(hits.z_mm[there] - casts["z_mm"][there]).max() < 0.05
+    # The mirrored one has the mesh of the others.
+    shapes = {thing.name: thing.shape for thing in scene.objects}
+    files = {shapes[name].file for name in ("wedge", "turned", "mirrored")}  # type: ignore[union-attr]
+    assert len(files) == 1

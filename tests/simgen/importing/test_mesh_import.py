@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pcii.base import InputError
 from simgen import Mesh, Scene, import_scene, load_scene
-from simgen.assets import read_mesh
+from simgen.assets import Triangles, ply_bytes, read_mesh
 
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]
 """Of a box 2 wide, 4 along Y, 6 along Z."""
@@ -59,8 +60,6 @@ def write_ascii_stl(path: Path) -> None:
 
 def boxes_mm(scene: Scene, folder: Path) -> dict[str, list[float]]:
     """Left, upper and near end, then right, lower and far end of each object."""
-    from scipy.spatial.transform import Rotation
-
     found = {}
     for thing in scene.objects:
         assert isinstance(thing.shape, Mesh)
@@ -73,8 +72,8 @@ def boxes_mm(scene: Scene, folder: Path) -> dict[str, list[float]]:
 
 def test_groups_of_an_obj_file_are_objects(tmp_path: Path) -> None:
     write_obj(tmp_path / "two.obj")
-    said = import_scene(tmp_path / "two.obj", tmp_path / "out", unit="cm", **AT_600)
-    scene = load_scene(str(tmp_path / "out"))
+    imported = import_scene(tmp_path / "two.obj", tmp_path / "out", unit="cm", **AT_600)
+    scene: Any = load_scene(str(tmp_path / "out"))
     assert boxes_mm(scene, tmp_path / "out") == {
         "left": [-30, -20, 570, -10, 20, 630],
         "right-red": [10, -20, 570, 30, 20, 630],
@@ -82,25 +81,23 @@ def test_groups_of_an_obj_file_are_objects(tmp_path: Path) -> None:
     }
     colours = [thing.material.reflectance for thing in scene.objects]
     assert colours == [(0.8, 0.1, 0.1), (0.8, 0.1, 0.1), (0, 0, 1)]
-    assert set(said.left_out) == {
+    assert set(imported.left_out) == {
         "colours of vertices",
         "pictures of materials (map_Kd)",
         "Ke of materials",
         "gloss of materials (Ks, Ns, Pr, Pm): all are matt",
         "the file has no light: the scene is lit evenly from all around",
     }
-    assert scene.light_around is not None
     assert not scene.light_around.visible
-    assert said.size_mm == pytest.approx((60, 40, 60))
+    assert imported.size_mm == pytest.approx((60, 40, 60))
 
 
 def test_colours_of_vertices_of_a_ply_file_are_named(tmp_path: Path) -> None:
-    properties = "".join(f"property float {name}\n" for name in "xyz") + "property uchar red\n"
-    head = f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
-    head += "property list uchar int vertex_indices\nend_header\n"
-    (tmp_path / "a.ply").write_text(f"{head}0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2\n")
-    said = import_scene(tmp_path / "a.ply", tmp_path / "out", unit="cm", **AT_600)
-    assert said.left_out[0] == "colours of vertices"
+    triangle = Triangles(np.eye(3), np.array([[0, 1, 2]]), None, np.eye(3, 2))
+    file = ply_bytes(triangle)
+    (tmp_path / "a.ply").write_bytes(file.replace(b" s\n", b" red\n").replace(b" t\n", b" green\n"))
+    imported = import_scene(tmp_path / "a.ply", tmp_path / "out", unit="cm", **AT_600)
+    assert imported.left_out[0] == "colours of vertices"
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
@@ -114,8 +111,8 @@ def test_the_axis_that_is_up(tmp_path: Path, up: Any) -> None:
         lines = (f"v {' '.join(map(str, np.add(end, step)))}\n" for step in np.eye(3))
         text += f"o {name}\n{''.join(lines)}f -3 -2 -1\n"
     (tmp_path / "ends.obj").write_text(text)
-    said = import_scene(tmp_path / "ends.obj", tmp_path / "out", unit="mm", up=up, **AT_600)
-    assert said.size_mm == pytest.approx((21, 21, 21))
+    imported = import_scene(tmp_path / "ends.obj", tmp_path / "out", unit="mm", up=up, **AT_600)
+    assert imported.size_mm == pytest.approx((21, 21, 21))
     boxes = boxes_mm(load_scene(str(tmp_path / "out")), tmp_path / "out")
     middles = {name: (np.add(box[:3], box[3:]) / 2).tolist() for name, box in boxes.items()}
     assert middles["right"][0] > 9
@@ -125,9 +122,9 @@ def test_the_axis_that_is_up(tmp_path: Path, up: Any) -> None:
 
 def test_solids_of_stl_files(tmp_path: Path) -> None:
     write_stl(tmp_path / "box.stl")
-    said = import_scene(tmp_path / "box.stl", tmp_path / "box", fit_mm=60, **AT_600)
-    assert (said.objects, said.triangles) == (1, 12)
-    assert said.size_mm == pytest.approx((20, 40, 60))
+    imported = import_scene(tmp_path / "box.stl", tmp_path / "box", fit_mm=60, **AT_600)
+    assert (imported.objects, imported.triangles) == (1, 12)
+    assert imported.size_mm == pytest.approx((20, 40, 60))
     assert len(read_mesh(tmp_path / "box" / "box.ply").positions) == 8
     write_ascii_stl(tmp_path / "two.stl")
     import_scene(tmp_path / "two.stl", tmp_path / "two", unit="m", **AT_600)
@@ -139,13 +136,10 @@ def test_meshes_that_cannot_be_imported(tmp_path: Path) -> None:
     whole = (tmp_path / "a.stl").read_bytes()
     (tmp_path / "cut.stl").write_bytes(whole[:-30])
     (tmp_path / "empty.obj").write_text("v 0 0 0\n")
+    nowhere = {"unit": "mm", "place_at_mm": None}
     cases = [
         ("a.stl", {}, "--unit: .* has no unit of length"),
-        (
-            "a.stl",
-            {"unit": "mm", "place_at_mm": None},
-            "has no camera; say where the middle of its 2 x 4 x 6 mm",
-        ),
+        ("a.stl", nowhere, "has no camera; say where the middle of its 2 x 4 x 6 mm"),
         ("cut.stl", {"unit": "mm"}, "has no faces|cut off"),
         ("empty.obj", {"unit": "mm"}, "has no faces"),
         ("none.ply", {"unit": "mm"}, "cannot be read"),

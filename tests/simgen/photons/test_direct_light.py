@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 import simgen
-from pcii.base import InputError
+from pcii.base import InputError, silent
 from pcii.types import CameraGrid
 from simgen.cameras import Rig, as_rig
 from simgen.dataset import capture_of, draw_from_views
@@ -30,22 +30,21 @@ from simgen.spec import Photons, Recipe
 COMPILED = backend.choose().kind != "scalar"
 BUDGET = 4000.0 if COMPILED else 400.0
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 20.0), focal_mm=50.0, pixel_mm=0.5632, height=64, width=64)
-BLACK = (0.0, 0.0, 0.0)
+EVENLY = simgen.UniformLight(luminance_cd_m2=1.0)
+GREY = simgen.Material(reflectance=(0.8, 0.8, 0.8))
 DEPTH = 2
 
 
 def shining(shape: Any, luminance: float, z_mm: float = 500.0, name: str = "lamp") -> simgen.SceneObject:
     emission = simgen.Emission(luminance_cd_m2=luminance)
-    material = simgen.Material(reflectance=BLACK, emission=emission)
+    material = simgen.Material(reflectance=(0.0, 0.0, 0.0), emission=emission)
     return simgen.SceneObject(name=name, position_mm=(7.0, 3.0, z_mm), shape=shape, material=material)
 
 
 def wall(*others: simgen.SceneObject) -> simgen.Scene:
     """Things before a wall that is lit evenly, of `WALL_RADIANCE` everywhere."""
-    grey = simgen.Material(reflectance=(0.8, 0.8, 0.8))
-    behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 620), shape=LARGE, material=grey)
-    light = simgen.UniformLight(luminance_cd_m2=1.0)
-    return simgen.Scene(title="lamp", objects=(*others, behind), lights=(light,))
+    behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 620), shape=LARGE, material=GREY)
+    return simgen.Scene(title="lamp", objects=(*others, behind), lights=(EVENLY,))
 
 
 def built(scene: simgen.Scene) -> RenderScene:
@@ -99,32 +98,24 @@ def test_a_hole_in_a_dark_room_shows_the_sky_in_every_view() -> None:
     """A closed room with a lamp, and a hole of half a pixel to a sky that is 10 000 times as bright."""
     side_mm, width_mm = 0.5 / PX_PER_MM, 600.0
     across, along = (width_mm + side_mm) / 2, 2 * width_mm + side_mm
-    walls = [
-        ((0, -across, 500), (0, 0, 0), (along, width_mm)),
-        ((0, across, 500), (0, 0, 0), (along, width_mm)),
-        ((-across, 0, 500), (0, 0, 0), (width_mm, side_mm)),
-        ((across, 0, 500), (0, 0, 0), (width_mm, side_mm)),
-        ((0, -300, 150), (90, 0, 0), (700, 900)),
-        ((0, 300, 150), (90, 0, 0), (700, 900)),
-        ((-300, 0, 150), (0, 90, 0), (900, 700)),
-        ((300, 0, 150), (0, 90, 0), (900, 700)),
-        ((0, 0, -200), (0, 0, 0), (700, 700)),
-    ]
-    parts = tuple(
-        simgen.SceneObject(
-            name=f"wall-{number}",
-            position_mm=place,
-            rotation_deg=turn,
-            shape=simgen.Card(width_mm=size[0], height_mm=size[1]),
-            material=simgen.Material(reflectance=(0.8, 0.8, 0.8)),
-        )
-        for number, (place, turn, size) in enumerate(walls)
-    )
+    walls: list[Any] = [((0, 0, -200), (0, 0, 0), (700, 700))]
+    for sign in (-1, 1):
+        walls += [((0, sign * across, 500), (0, 0, 0), (along, width_mm))]
+        walls += [((sign * across, 0, 500), (0, 0, 0), (width_mm, side_mm))]
+        walls += [
+            ((0, sign * 300, 150), (90, 0, 0), (700, 900)),
+            ((sign * 300, 0, 150), (0, 90, 0), (900, 700)),
+        ]
+    parts = []
+    for number, (place, turn, (width, height)) in enumerate(walls):
+        part = simgen.Card(width_mm=width, height_mm=height)
+        thing = simgen.SceneObject(name=f"wall-{number}", position_mm=place, shape=part, material=GREY)
+        parts.append(thing.change(rotation_deg=turn))
     lamp = simgen.PointLight(position_mm=(0.0, -200.0, 200.0), intensity_cd=1.0)
-    dark = simgen.Scene(title="room", objects=parts, lights=(lamp,))
+    dark = simgen.Scene(title="room", objects=tuple(parts), lights=(lamp,))
     view = simgen.render(dark, GRID, samples_per_pixel=64, max_depth=DEPTH).view(0, 0)[..., 1]
     sky = 1e4 * float(view.mean())
-    lit = dark.change(lights=(lamp, simgen.UniformLight(luminance_cd_m2=sky)))
+    lit = dark.change(lights=(lamp, EVENLY.change(luminance_cd_m2=sky)))
     photons = drawn(Capture(built(lit), GRID, None, Photons(budget=2000, statistics="multinomial")), draws=3)
     views = np.concatenate([2 * one.k + one.l for one in photons])
     beyond_room = np.concatenate([one.z_mm == np.inf for one in photons])
@@ -135,8 +126,7 @@ def test_a_hole_in_a_dark_room_shows_the_sky_in_every_view() -> None:
 
 def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[float, float]:
     """Light of a surface on all films by the sampler, and the largest share of a bound that is used."""
-    light = simgen.UniformLight(luminance_cd_m2=1.0)
-    scene = built(simgen.Scene(title="empty", lights=(light,)))
+    scene = built(simgen.Scene(title="empty", lights=(EVENLY,)))
     sampler = EmissionSampler(Capture(replace(scene, shining=(surface,)), rig, cfa))
     if not sampler.mass:
         return 0.0, 0.0
@@ -169,8 +159,7 @@ def test_small_balls_shine_as_they_should(radius_mm: float) -> None:
     distance_mm, luminance = 1000.0, 1e3 * (10 / radius_mm) ** 2
     ball = shining(simgen.Sphere(radius_mm=radius_mm), luminance).change(position_mm=(0.0, -300.0, 600.0))
     card = simgen.Card(width_mm=5000.0, height_mm=5000.0)
-    grey = simgen.Material(reflectance=(0.8, 0.8, 0.8))
-    behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 1600), shape=card, material=grey)
+    behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 1600), shape=card, material=GREY)
     grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=1.2, height=16, width=16)
     scene = simgen.Scene(title="bulb", objects=(ball, behind))
     view = simgen.render(scene, grid, samples_per_pixel=256, max_depth=2).view(0, 0)[..., 1]
@@ -182,9 +171,7 @@ def test_small_balls_shine_as_they_should(radius_mm: float) -> None:
 
 
 def test_a_ball_that_is_too_small_to_shine_is_refused() -> None:
-    with pytest.raises(
-        InputError, match=r"'lamp', shape.radius_mm: 1e-05 is too small to shine at 500\.1 mm"
-    ):
+    with pytest.raises(InputError, match=r"'lamp', shape.radius_mm: 1e-05 is too small to shine at 500\.1"):
         built(wall(shining(simgen.Sphere(radius_mm=1e-5), 1.0)))
 
 
@@ -204,15 +191,12 @@ def test_noise_of_views_is_measured_and_too_much_is_refused() -> None:
     grid = {"rows": 2, "cols": 2, "height": 64, "width": 64}
     made = Recipe.model_validate({"scene": "any", "grid": grid, "photons": {"budget": 500}})
     no_scene: Any = None
-    capture, plan = capture_of(made, no_scene, 1), Plan(False, 4, 500.0)
-    shape = made.grid.height, made.grid.width
+    capture, plan, pixels = capture_of(made, no_scene, 1), Plan(False, 4, 500.0), 64**2
 
     def draw(variance: float) -> dict[str, Any]:
-        return draw_from_views(
-            capture, lambda k, l: np.ones(shape), lambda k, l: np.full(3, variance), plan, lambda *_: None
-        )[1]
+        views = lambda k, l: np.ones((64, 64)), lambda k, l: np.full(3, variance)
+        return draw_from_views(capture, *views, plan, silent)[1]
 
-    pixels = shape[0] * shape[1]
     # Added variance g^2 v beside g pixels, g = 500 / pixels.
     assert draw(0.02)["rendering_noise"] == pytest.approx(500 / pixels * 3 * 0.02 / pixels, rel=0.01)
     with pytest.raises(InputError, match=r"^photons: the noise of views rendered with 4 samples per pixel"):

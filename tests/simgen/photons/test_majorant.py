@@ -88,9 +88,8 @@ def test_a_gap_in_a_surface_is_listed_with_the_bound_of_what_is_around_it() -> N
     samples = Samples(zero, zero, row, col, np.full(row.size, 300.0), light, light)
     majorant = fit(grid, layers_for(grid, tile_px, samples.z_mm), samples, DIM)
     middle = np.array([21 * tile_px])
-    inside = Samples(
-        zero[:1], zero[:1], middle, np.array([31 * tile_px]), np.array([300.0]), light[:1], light[:1]
-    )
+    beside = np.array([31 * tile_px])
+    inside = Samples(zero[:1], zero[:1], middle, beside, np.array([300.0]), light[:1], light[:1])
     (entry,) = majorant.owner_of(inside)
     assert majorant.layer[entry] >= 0
     np.testing.assert_allclose(majorant.bound[entry], 1.0, rtol=1e-6)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
-from scipy import stats
+from lit_scenes import EVENLY, LAMP, build_scene
+from photon_statistics import counted, is_poisson, p_value
 
 from pcii.base import InputError, silent
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name
@@ -16,7 +17,7 @@ from simgen.dataset import capture_of, draw_from_views, write_counts
 from simgen.photons import Capture, Plan, plan_counts, thin_photons
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import PhotonTable, nested_subset
-from simgen.spec import Recipe, Scene, load_scene
+from simgen.spec import Recipe, load_scene
 
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, MAX_SINGLE_PHOTONS = 0.01, 0.003, 1 << 25
@@ -70,11 +71,9 @@ def two_objects() -> RenderScene:
     return build(backend.load(), found, found.folder or Path(), 3)
 
 
-def counted(counts: PhotonTable, made: Recipe) -> np.ndarray:
+def by_pixel(counts: PhotonTable, recipe: Recipe) -> np.ndarray:
     """Counts per pixel, (V, H, W)."""
-    found = np.zeros(made.grid.camera_grid().shape_KLHW, dtype=np.int64)
-    np.add.at(found, (counts.k, counts.l, counts.i, counts.j), counts.n)
-    return found.reshape(-1, HEIGHT, WIDTH)
+    return counted(counts, recipe.grid.camera_grid()).reshape(-1, HEIGHT, WIDTH)
 
 
 def subset(arrivals: PhotonTable, made: Recipe, budget: float) -> PhotonTable:
@@ -93,13 +92,6 @@ def by_scope(views: np.ndarray, scope: str) -> np.ndarray:
     return np.concatenate([views[:, colours == colour].sum(axis=1) for colour in range(3)])
 
 
-def is_poisson(totals: np.ndarray, budget: float) -> bool:
-    """Whether mean and variance are those of as many Poisson numbers, within 4 standard errors."""
-    n = totals.size
-    mean_fits = abs(totals.mean() - budget) < 4 * np.sqrt(budget / n)
-    return bool(mean_fits and abs(totals.var(ddof=1) - budget) < 4 * np.sqrt((budget + 2 * budget**2) / n))
-
-
 @pytest.mark.parametrize(("scope", "draws"), [("view", 150), ("channel", 50), ("scene", 600)])
 def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
     totals: dict[int, list[np.ndarray]] = {budget: [] for budget in BUDGETS}
@@ -107,7 +99,7 @@ def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
         made = recipe(seed=seed, photons=nested(scope=scope))
         arrivals = dense(made)
         for budget, drawn in totals.items():
-            drawn.append(by_scope(counted(subset(arrivals, made, budget), made), scope))
+            drawn.append(by_scope(by_pixel(subset(arrivals, made, budget), made), scope))
     found = {budget: np.concatenate(drawn) for budget, drawn in totals.items()}
     assert found[120].size >= 600
     for budget in BUDGETS:
@@ -129,7 +121,7 @@ def test_multinomial_totals_of_nested_budgets_are_exact(
     made = recipe(photons=nested(scope=scope, statistics="multinomial"))
     arrivals = thin(made, two_objects) if thins else dense(made)
     for budget in BUDGETS:
-        totals = by_scope(counted(subset(arrivals, made, budget), made), scope)
+        totals = by_scope(by_pixel(subset(arrivals, made, budget), made), scope)
         assert totals.tolist() == [budget] * {"view": 4, "channel": 12, "scene": 1}[scope]
 
 
@@ -140,13 +132,13 @@ def test_each_budget_is_a_subset_of_the_next(statistics: str) -> None:
     belongs = [nested_subset(arrivals, arrivals, made.photons, budget, made.seed) for budget in (8, 40)]
     assert 0 < belongs[0].sum() < belongs[1].sum() < belongs[1].size
     assert (belongs[0] <= belongs[1]).all()
-    larger = counted(arrivals.take(belongs[1]), made)
+    larger = by_pixel(arrivals.take(belongs[1]), made)
     # Budgets that are nearly the same: 100 times the smaller one might get more than the larger.
     near = recipe(10, 10, photons={"budget": 120, "nested": [38, 40], "statistics": statistics})
     many = dense(near)
     less, more = (nested_subset(many, many, near.photons, budget, near.seed) for budget in (38, 40))
     assert (less <= more).all()
-    independent = counted(subset(dense(recipe(seed=2)), made, 8), made)
+    independent = by_pixel(subset(dense(recipe(seed=2)), made, 8), made)
     assert (independent > larger).any()  # the fault: a smaller budget that was drawn by itself
 
 
@@ -156,21 +148,16 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
     found, first_rows = np.zeros(views.shape), np.zeros(views.shape)
     for seed in range(draws):
         made = recipe(seed=seed)
-        arrivals = dense(made)
-        found += counted(subset(arrivals, made, 8), made)
+        arrivals: Any = dense(made)
+        found += by_pixel(subset(arrivals, made, 8), made)
         in_order = np.arange(arrivals.k.size)
-        assert arrivals.scope is not None
         start = np.searchsorted(arrivals.scope, np.arange(4))
-        first_rows += counted(arrivals.take(in_order - start[arrivals.scope] < 8), made)
+        first_rows += by_pixel(arrivals.take(in_order - start[arrivals.scope] < 8), made)
     lit = expected > 0
     assert (found[~lit] == 0).all()
-
-    def chi_square(pooled: np.ndarray) -> float:
-        return float(((pooled - draws * expected)[lit] ** 2 / (draws * expected[lit])).sum())
-
-    assert stats.chi2.sf(chi_square(found), lit.sum()) > 1e-3
+    assert p_value(found[lit], draws * expected[lit]) > 1e-3
     # The fault: a scope's first photons by their place on the film, not by chance.
-    assert stats.chi2.sf(chi_square(first_rows), lit.sum()) < 1e-6
+    assert p_value(first_rows[lit], draws * expected[lit]) < 1e-6
 
 
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
@@ -180,7 +167,7 @@ def test_views_without_light_have_no_photons_of_any_budget() -> None:
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
-        totals = by_scope(counted(subset(arrivals, made, budget), made), "view")
+        totals = by_scope(by_pixel(subset(arrivals, made, budget), made), "view")
         assert totals.tolist() == [0, 0, budget, budget]
 
 
@@ -207,14 +194,14 @@ IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
 @pytest.mark.parametrize("sensor", [{}, FAULTY | {"bits": 2}, IN_FRAMES])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
-    told = write_counts(without_scene(made), made.sensor, dense(made), tmp_path, with_origins=True)
+    log = write_counts(without_scene(made), made.sensor, dense(made), tmp_path, with_origins=True)
     whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
     assert (small <= middle).all()
     assert (middle <= whole).all()
     assert small.sum() < middle.sum() < whole.sum()
-    assert told["total"] == whole.sum()
-    assert told["pixels_with_photons"] == (whole > 0).sum()
-    assert told["nested"] == [
+    assert log["total"] == whole.sum()
+    assert log["pixels_with_photons"] == (whole > 0).sum()
+    assert log["nested"] == [
         {"budget": budget, "total": part.sum(), "pixels_with_photons": (part > 0).sum()}
         for budget, part in ((8, small), (40, middle))
     ]
@@ -284,11 +271,9 @@ PROBED = {"rows": 2, "cols": 3, "height": 64, "width": 64, "pixel_mm": 0.5}
 @pytest.fixture(scope="module")
 def wall() -> RenderScene:
     """Evenly lit, but for the noise of paths that a lamp's area and a second surface bring."""
-    lamp = {"type": "area", "position_mm": (300, 0, 100), "target_mm": (0, 0, 500), "luminance_cd_m2": 100.0}
-    backdrop = {"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
+    lamp = LAMP | {"position_mm": (300, 0, 100), "target_mm": (0, 0, 500), "luminance_cd_m2": 100.0}
     lamp |= {"width_mm": 300.0, "height_mm": 300.0}
-    found = Scene.model_validate({"title": "a wall", "lights": [lamp], "backdrop": backdrop})
-    return build(backend.load(), found, Path(), 3)
+    return build_scene([], [lamp], max_depth=3, backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)})
 
 
 @pytest.mark.renders
@@ -298,11 +283,11 @@ def test_what_is_made_in_either_way_is_exact_at_every_budget(
     ways = set()
     for scene, kind in ((two_objects, "llvm"), (two_objects, "scalar"), (wall, "llvm")):
         for budget in (10, 1e3, 1e7, 1e9):
-            made = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
-            assert made.thins or (made.noise <= MAX_NOISE_SHARE and budget > 10)
-            assert made.normaliser_error <= MAX_NORMALISER_ERROR
-            assert made.keeps_origins == (6 * budget <= MAX_SINGLE_PHOTONS)
-            ways.add((made.thins, made.keeps_origins))
+            plan = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
+            assert plan.thins or (plan.noise <= MAX_NOISE_SHARE and budget > 10)
+            assert plan.normaliser_error <= MAX_NORMALISER_ERROR
+            assert plan.keeps_origins == (6 * budget <= MAX_SINGLE_PHOTONS)
+            ways.add((plan.thins, plan.keeps_origins))
     assert len(ways) == 4
 
 
@@ -323,7 +308,7 @@ def test_photons_that_are_too_many_to_be_kept_are_the_same_but_for_their_origins
     assert kept.object_id is not None
     assert summed.object_id is None
     assert summed.k.size < kept.k.size == summed.n.sum()
-    np.testing.assert_array_equal(counted(summed, made), counted(kept, made))
+    np.testing.assert_array_equal(by_pixel(summed, made), by_pixel(kept, made))
 
 
 @pytest.mark.renders
@@ -338,12 +323,10 @@ def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: d
 
 @pytest.mark.renders
 def test_darkness_is_planned_too() -> None:
-    light = {"type": "uniform", "luminance_cd_m2": 1.0}
-    wall = {"title": "dark", "lights": [light], "backdrop": {"z_mm": 500.0}}
-    dark = build(backend.load(), Scene.model_validate(wall), Path(), 3)
+    dark = build_scene([], [EVENLY], max_depth=3, backdrop={"z_mm": 500.0})
     for kind in ("llvm", "scalar"):
-        made = planned(recipe(grid=PROBED, photons={"budget": 1000}), dark, kind)
-        assert (made.thins, made.samples, made.noise, made.normaliser_error) == (False, 1, 0, 0)
+        plan = planned(recipe(grid=PROBED, photons={"budget": 1000}), dark, kind)
+        assert (plan.thins, plan.samples, plan.noise, plan.normaliser_error) == (False, 1, 0, 0)
         exposed = recipe(grid=PROBED, photons={"scope": "exposure"}, exposure={})
         assert not planned(exposed, dark, kind).thins
     # What the virtual centre sees says nothing about how large a budget is.

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_scenes import EVENLY, LAMP, ball, lit, two_balls
+from lit_scenes import EVENLY_30, LAMP, ball, card, lit, mosaics, on_blocks, two_balls
+from photon_statistics import counted, p_value
 from scipy import stats
 
 from pcii.base import InputError
-from pcii.types import CameraGrid, colour_index, mosaic
+from pcii.types import CameraGrid, colour_index
 from simgen.photons import Capture, Plan, explore, plan_counts, thin_photons
-from simgen.renderer import RenderScene, backend, load_drjit, render_view
+from simgen.renderer import RenderScene, backend, load_drjit
 from simgen.sensor import PhotonTable
 from simgen.spec import Photons
 from simgen.truth import first_hits_of_view
@@ -33,11 +34,7 @@ def scene() -> RenderScene:
 @pytest.fixture(scope="module")
 def radiance(scene: RenderScene) -> np.ndarray:
     """Mosaics (V, H, W) from 1024 samples per pixel: good to about 2 % per pixel, 0.2 % per tile."""
-    views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
-        for k, l in np.ndindex(2, 2)
-    ]
-    return mosaic(np.stack(views).astype(np.float64), "GRBG")
+    return mosaics(scene, GRID, 1024, seed=7)
 
 
 explorations: dict[tuple[int, str], tuple[RenderScene, Plan]] = {}
@@ -67,11 +64,9 @@ def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonTable:
     return draw_with_log(scene, seed, **photons)[0]
 
 
-def counted(drawn: PhotonTable) -> np.ndarray:
+def by_pixel(drawn: PhotonTable) -> np.ndarray:
     """Photons per pixel, (V, H, W)."""
-    counts = np.zeros((4, 32, 32), dtype=np.int64)
-    np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
-    return counts
+    return counted(drawn, GRID).reshape(4, 32, 32)
 
 
 def uniform_if_poisson(counts: np.ndarray, rates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -81,13 +76,8 @@ def uniform_if_poisson(counts: np.ndarray, rates: np.ndarray, rng: np.random.Gen
 
 
 def on_tiles(pixels: np.ndarray) -> np.ndarray:
-    """Sums over 4 x 4 pixels, (V, 8, 8)."""
-    return pixels.reshape(-1, 8, 4, 8, 4).sum(axis=(2, 4))
-
-
-def tiles(repeated: np.ndarray) -> np.ndarray:
-    """Sums over 4 x 4 pixels of each draw, (N, V, 8, 8)."""
-    return np.stack([on_tiles(counts) for counts in repeated])
+    """Sums over 4 x 4 pixels, (..., V, 8, 8)."""
+    return on_blocks(pixels, 4)
 
 
 def rates_of(radiance: np.ndarray, budget: float) -> np.ndarray:
@@ -97,7 +87,7 @@ def rates_of(radiance: np.ndarray, budget: float) -> np.ndarray:
 @pytest.fixture(scope="module")
 def repeated(scene: RenderScene) -> np.ndarray:
     """Photons per pixel of independent draws of 1500 photons per view, (`DRAWS`, V, H, W)."""
-    return np.stack([counted(draw(scene, seed, budget=1500)) for seed in range(DRAWS)])
+    return np.stack([by_pixel(draw(scene, seed, budget=1500)) for seed in range(DRAWS)])
 
 
 def test_counts_fit_the_rendered_rates_pixel_by_pixel_and_tile_by_tile(
@@ -106,35 +96,28 @@ def test_counts_fit_the_rendered_rates_pixel_by_pixel_and_tile_by_tile(
     rng = np.random.default_rng(1)
     rates = rates_of(radiance, 1500.0)
     tilted = rates * np.linspace(0.9, 1.1, 32)  # the fault: brightness off by up to 10 % across the film
-    for counts, expected in ((repeated, rates), (tiles(repeated), on_tiles(rates))):
+    for counts, expected in ((repeated, rates), (on_tiles(repeated), on_tiles(rates))):
         p_values = [
             stats.kstest(uniform_if_poisson(n, expected, rng).ravel(), "uniform").pvalue for n in counts
         ]
         # Each draw's p-value is itself uniform; one suite in a thousand fails by chance.
         assert stats.kstest(p_values, "uniform").pvalue > 1e-3
-    pooled, n = tiles(repeated).sum(axis=0), len(repeated)
-
-    def chi_square(expected: np.ndarray) -> float:
-        return float(((pooled - n * on_tiles(expected)) ** 2 / (n * on_tiles(expected))).sum())
-
-    assert stats.chi2.sf(chi_square(rates), pooled.size) > 1e-3
-    assert stats.chi2.sf(chi_square(tilted), pooled.size) < 1e-6
+    pooled, n = on_tiles(repeated).sum(axis=0), len(repeated)
+    assert p_value(pooled, n * on_tiles(rates)) > 1e-3
+    assert p_value(pooled, n * on_tiles(tilted)) < 1e-6
 
 
 def test_totals_are_poisson(repeated: np.ndarray) -> None:
-    def dispersion(totals: np.ndarray) -> float:
-        return float(stats.chi2.sf(((totals - 1500) ** 2 / 1500).sum(), totals.size))
-
-    totals = repeated.sum(axis=(2, 3)).ravel()
-    assert 1e-3 < dispersion(totals) < 1 - 1e-3
-    assert dispersion(np.full(totals.size, 1500)) > 1 - 1e-3  # the fault: as many each time
-    assert dispersion(totals + 150) < 1e-3
+    totals, mean = repeated.sum(axis=(2, 3)).ravel(), np.array(1500)
+    assert 1e-3 < p_value(totals, mean) < 1 - 1e-3
+    assert p_value(np.full(totals.size, 1500), mean) > 1 - 1e-3  # the fault: as many each time
+    assert p_value(totals + 150, mean) < 1e-3
 
 
 def test_there_is_no_rendering_noise_in_the_counts(
     scene: RenderScene, repeated: np.ndarray, radiance: np.ndarray
 ) -> None:
-    rates, drawn = on_tiles(rates_of(radiance, 1500.0)), tiles(repeated)
+    rates, drawn = on_tiles(rates_of(radiance, 1500.0)), on_tiles(repeated)
 
     def dispersion(counts: np.ndarray) -> float:
         return float(((counts - rates) ** 2 / rates).mean())
@@ -143,28 +126,15 @@ def test_there_is_no_rendering_noise_in_the_counts(
     spread = np.sqrt((2 + (1 / rates).mean()) / drawn.size)
     assert abs(dispersion(drawn) - 1) < 4 * spread
     rng = np.random.default_rng(2)
-    noisy = np.stack([rng.poisson(rates_of(one_sample(scene, seed), 1500.0)) for seed in range(20)])
-    assert dispersion(tiles(noisy)) > 1 + 8 * spread
-
-
-def one_sample(scene: RenderScene, seed: int) -> np.ndarray:
-    """The fault: mosaics of one sample per pixel, whose noise makes counts a Cox process."""
-    views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=1, seed=8 * seed + 2 * k + l)
-        for k, l in np.ndindex(2, 2)
-    ]
-    return mosaic(np.stack(views).astype(np.float64), "GRBG")
-
-
-colour_of_pixel = colour_index(32, 32, "GRBG")
+    # The fault: mosaics of one sample per pixel, whose noise makes counts a Cox process.
+    one_sample = (mosaics(scene, GRID, 1, seed=8 * seed) for seed in range(20))
+    noisy = np.stack([rng.poisson(rates_of(each, 1500.0)) for each in one_sample])
+    assert dispersion(on_tiles(noisy)) > 1 + 8 * spread
 
 
 def test_the_first_photons_of_a_scope_are_a_smaller_draw(scene: RenderScene, radiance: np.ndarray) -> None:
-    drawn = draw(scene, 6, budget=20_000, statistics="multinomial")
-    assert drawn.rank is not None
-    first = drawn.rank < 2000
-    counts = np.zeros((4, 32, 32))
-    np.add.at(counts, (2 * drawn.k[first] + drawn.l[first], drawn.i[first], drawn.j[first]), 1)
+    drawn: Any = draw(scene, 6, budget=20_000, statistics="multinomial")
+    counts = by_pixel(drawn.take(drawn.rank < 2000))
     assert counts.sum(axis=(1, 2)).tolist() == [2000] * 4
     expected = on_tiles(rates_of(radiance, 2000.0))
     chi = ((on_tiles(counts) - expected) ** 2 / expected).sum()
@@ -187,9 +157,7 @@ def seen_in_pixels(scene: RenderScene, drawn: PhotonTable) -> tuple[np.ndarray, 
 
 
 def test_each_photon_knows_what_it_came_from(scene: RenderScene) -> None:
-    drawn = draw(scene, 7, budget=1000)
-    assert drawn.object_id is not None
-    assert drawn.z_mm is not None
+    drawn: Any = draw(scene, 7, budget=1000)
     object_id, z_mm = seen_in_pixels(scene, drawn)
 
     def agrees(own_id: np.ndarray, own_z_mm: np.ndarray) -> np.ndarray:
@@ -212,24 +180,16 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     plastic, gold = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1)), ball("gold", 150.0, 700.0, (0, 0, 0))
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
-    scene = lit([plastic, gold], [lamp, EVENLY])
+    scene = lit([plastic, gold], [lamp, EVENLY_30])
     budget = 10_000 if COMPILED else 6000
     drawn, log = draw_with_log(scene, 1, budget=budget)
     assert log["paths_above_bound"] <= 1e-2 * log["kept"]
-    views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=3 + 2 * k + l)
-        for k, l in np.ndindex(2, 2)
-    ]
-    rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
+    rates = rates_of(mosaics(scene, GRID, 1024, seed=3), budget)
     assert rates.max() > 0.1 * budget  # a tenth of the light and more is in one pixel's highlight
-    counts = on_tiles(counted(drawn))
-
-    def chi_square(expected: np.ndarray) -> float:
-        return float(((counts - expected) ** 2 / expected).sum())
-
-    assert stats.chi2.sf(chi_square(on_tiles(rates)), counts.size) > 1e-3
+    counts = on_tiles(by_pixel(drawn))
+    assert p_value(counts, on_tiles(rates)) > 1e-3
     dulled = np.minimum(rates, 0.7 * rates.max())  # the fault: the brightest highlights are clipped
-    assert stats.chi2.sf(chi_square(on_tiles(dulled)), counts.size) < 1e-3
+    assert p_value(counts, on_tiles(dulled)) < 1e-3
 
 
 @pytest.mark.skipif(not COMPILED, reason="scalar mode draws photons on one thread")
@@ -249,33 +209,24 @@ def test_the_number_of_threads_changes_nothing(scene: RenderScene) -> None:
 def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
     # Little more than a pixel wide: a tile holds red that has no blue, and blue that has no red.
     stripes = [
-        {
-            "name": f"stripe{number}",
-            "position_mm": (30.0 * number - 225.0, 0.0, 600.0),
-            "shape": {"type": "card", "width_mm": 30.0, "height_mm": 400.0},
-            "material": {"reflectance": (1.0, 0.0, 0.0) if number % 2 else (0.0, 0.0, 1.0)},
-        }
-        for number in range(16)
+        card(600.0, 30.0, {"reflectance": colour}, f"stripe{number}", at_mm=(30.0 * number - 225.0, 0.0))
+        for number, colour in enumerate(8 * [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
     ]
+    for stripe in stripes:
+        stripe["shape"]["height_mm"] = 400.0
     scene = lit(stripes)
-    counts = counted(draw(scene, 1, budget=30_000))
+    counts = by_pixel(draw(scene, 1, budget=30_000))
     # Stripes' edges vary most within pixels: with fewer samples the rates' own noise would show.
-    views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=1024, seed=7 + 2 * k + l)
-        for k, l in np.ndindex(2, 2)
-    ]
-    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 30_000.0)
+    rates = rates_of(mosaics(scene, GRID, 1024, seed=7), 30_000.0)
+    colours = colour_index(32, 32, "GRBG")
     for colour in range(3):
-        found, own = (
-            counts[:, colour_of_pixel == colour].ravel(),
-            expected[:, colour_of_pixel == colour].ravel(),
-        )
-        assert found[own == 0].sum() == 0
-        found, own = found[own > 1], own[own > 1]  # chi-square wants a photon or two
-        assert stats.chi2.sf(((found - own) ** 2 / own).sum(), own.size) > 1e-3, "RGB"[colour]
+        found, expected = (pixels[:, colours == colour].ravel() for pixels in (counts, rates))
+        assert found[expected == 0].sum() == 0
+        found, expected = found[expected > 1], expected[expected > 1]  # chi-square wants a photon or two
+        assert p_value(found, expected) > 1e-3, "RGB"[colour]
         # The fault: where a colour is dark beside another it gets too little.
-        missing = np.where(own < np.median(own), 0.8 if COMPILED else 0.6, 1.0) * own
-        assert stats.chi2.sf(((found - missing) ** 2 / missing).sum(), own.size) < 1e-3
+        missing = np.where(expected < np.median(expected), 0.8 if COMPILED else 0.6, 1.0) * expected
+        assert p_value(found, missing) < 1e-3
 
 
 def too_low(explored: Plan, factor: float) -> Plan:
@@ -298,14 +249,11 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         drawn, log = thin_photons(capture, known, lambda *stage: reported.append(stage))
         assert log["paths_above_bound"] > 100
         expected = on_tiles(rates_of(radiance, MANY / 20) if gain is None else gain * radiance)
-        found = on_tiles(counted(drawn))
+        found = on_tiles(by_pixel(drawn))
         seen = expected > 5
         # The reference is good to 0.2 % of a tile.
-        return float(
-            stats.chi2.sf(
-                ((found - expected)[seen] ** 2 / (expected + (0.002 * expected) ** 2)[seen]).sum(), seen.sum()
-            )
-        )
+        variance = expected + (0.002 * expected) ** 2
+        return float(stats.chi2.sf(((found - expected)[seen] ** 2 / variance[seen]).sum(), seen.sum()))
 
     assert chi_square() > 1e-3
     for stage in {name for name, _, _ in reported}:
@@ -314,8 +262,7 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
     # The fault: paths that exceed their bound give one photon, and nothing is drawn of what lies above.
     monkeypatch.setattr("simgen.photons.thinning._Drawing._draw_above", lambda *_: None)
     thin = thin_photons(capture, known)[0]
-    expected = on_tiles(rates_of(radiance, float(thin.k.size) / 4))
-    assert stats.chi2.sf(((on_tiles(counted(thin)) - expected) ** 2 / expected).sum(), expected.size) < 1e-6
+    assert p_value(on_tiles(by_pixel(thin)), on_tiles(rates_of(radiance, float(thin.k.size) / 4))) < 1e-6
 
 
 def test_light_that_exceeds_every_bound_is_refused(
@@ -329,27 +276,16 @@ def test_light_that_exceeds_every_bound_is_refused(
         thin_photons(capture, known)
 
 
-WALL = {
-    "name": "wall",
-    "position_mm": (0.0, 0.0, 800.0),
-    "shape": {"type": "card", "width_mm": 4000.0, "height_mm": 4000.0},
-    "material": {"reflectance": (0.5, 0.5, 0.5)},
-}
-
-
 def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has() -> None:
-    lamp = {
-        "type": "area",
-        "position_mm": (-250, -350, 150),
-        "target_mm": (0, 0, 580),
-        "luminance_cd_m2": 2e4,
-    }
+    lamp = LAMP | {"position_mm": (-250, -350, 150), "target_mm": (0, 0, 580), "luminance_cd_m2": 2e4}
     lamp |= {"width_mm": 60, "height_mm": 60}
-    metal = {"finish": {"type": "metal", "name": "Al", "roughness": 0.05}}
+    wall = card(800.0, 4000.0, {"reflectance": (0.5, 0.5, 0.5)}, "wall")
+    metal: dict[str, Any] = {"finish": {"type": "metal", "name": "Al", "roughness": 0.05}}
+    matt: dict[str, Any] = {"reflectance": (0.7, 0.3, 0.2)}
     grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
-    for material, is_bounded in ((metal, False), ({"reflectance": (0.7, 0.3, 0.2)}, True)):
-        thing = ball("ball", 40.0, 590.0, (1, 1, 1)) | {"material": material}
-        capture = Capture(lit([WALL, thing], [lamp]), grid, "GRBG", Photons(budget=3000), seed=1)
+    for material, is_bounded in ((metal, False), (matt, True)):
+        scene = lit([wall, ball("ball", 40.0, 590.0, **material)], [lamp])
+        capture = Capture(scene, grid, "GRBG", Photons(budget=3000), seed=1)
         made = plan_counts(capture, backend.choose().kind)
         assert (made.thins, bool(made.why_rendered)) == (is_bounded, not is_bounded)
         assert made.noise <= 0.01

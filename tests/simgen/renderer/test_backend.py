@@ -39,12 +39,11 @@ def trials(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def test_without_any_library_it_is_scalar(libraries: Path) -> None:
+def test_the_newest_that_works_is_chosen_and_without_any_it_is_scalar(
+    libraries: Path, trials: list[str]
+) -> None:
     assert backend.choose().kind == "scalar"
     assert "libllvm19" in (backend.advice() or "")
-
-
-def test_the_newest_that_works_is_chosen(libraries: Path, trials: list[str]) -> None:
     names = ("libLLVM-15.so.1", "libLLVM.so.20.1", "libLLVM.so.19.1", "libLLVM-9.so", "libLLVMCore.so.21")
     for name in names:
         (libraries / name).touch()
@@ -53,13 +52,8 @@ def test_the_newest_that_works_is_chosen(libraries: Path, trials: list[str]) -> 
     assert (choice.kind, choice.library) == ("llvm", str(libraries / "libLLVM.so.19.1"))
     assert trials == ["libLLVM.so.20.1", "libLLVM.so.19.1"]
     assert backend.advice() is None
-    assert [(each.kind, each.works) for each in backend.survey()] == [
-        ("llvm", False),
-        ("llvm", True),
-        ("llvm", False),
-        ("llvm", False),
-        ("scalar", True),
-    ]
+    works = [(each.kind, each.works) for each in backend.survey()]
+    assert works == [*(("llvm", number == 1) for number in range(4)), ("scalar", True)]
     assert backend.survey()[0].detail == "LLVM 20 ended with signal 6"
 
 
@@ -84,10 +78,7 @@ def test_answers_are_cached_until_the_library_changes(
 def test_a_request_is_met_or_refused(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SIMGEN_BACKEND", "scalar")
     assert backend.choose().variant == "scalar_rgb"
-    for request, sentence in (
-        ("llvm", "llvm does not work here"),
-        ("opencl", "use one of cuda, llvm, scalar"),
-    ):
+    for request, sentence in (("llvm", "llvm does not work here"), ("opencl", "use one of cuda, llvm,")):
         monkeypatch.setenv("SIMGEN_BACKEND", request)
         with pytest.raises(InputError, match=sentence):
             backend.choose()

@@ -28,7 +28,7 @@ def in_windows(scene: RenderScene) -> tuple[np.ndarray, int]:
 
 
 def test_windows_show_all_of_a_card_and_not_much_more() -> None:
-    scene = lit([card("card", 600.0, 200.0, at_mm=(20.0, -30.0))])
+    scene = lit([card(600.0, 200.0, at_mm=(20.0, -30.0))])
     is_window, _ = in_windows(scene)
     is_card = first_hits_of_view(scene, GRID, 0, 1).object_id > 0
     assert is_window[is_card].all()

@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
+from lit_scenes import build_scene
+from photon_statistics import counted
 
 from pcii.base import silent
 from pcii.types import colour_index, sense
 from simgen.dataset import capture_of, draw_from_views
 from simgen.photons import Plan, plan_counts, thin_photons
-from simgen.renderer import RenderScene, backend, build, render_view
+from simgen.renderer import RenderScene, render_view
 from simgen.sensor import PhotonTable, photons_per_radiance
-from simgen.spec import Exposure, Recipe, Scene
+from simgen.spec import Exposure, Recipe
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
@@ -34,9 +35,7 @@ def recipe(**changes: object) -> Recipe:
 
 @pytest.fixture(scope="module")
 def lit_evenly() -> RenderScene:
-    light = {"type": "uniform", "luminance_cd_m2": LUMINANCE_CD_M2}
-    scene = Scene.model_validate({"title": "nothing but light", "lights": [light]})
-    return build(backend.load(), scene, Path(), 3)
+    return build_scene([], [{"type": "uniform", "luminance_cd_m2": LUMINANCE_CD_M2}])
 
 
 def planned(thins: bool) -> Plan:
@@ -58,12 +57,6 @@ def dense(made: Recipe, built: RenderScene) -> PhotonTable:
     return draw_from_views(capture, mosaic_of, lambda k, l: np.zeros(3), planned(False), silent)[0]
 
 
-def counted(arrivals: PhotonTable) -> np.ndarray:
-    counts = np.zeros((2, 64, 80), dtype=np.int64)
-    np.add.at(counts, (arrivals.l, arrivals.i, arrivals.j), arrivals.n)
-    return counts
-
-
 def test_photons_per_radiance_are_those_by_hand() -> None:
     found = photons_per_radiance(Exposure(f_number=F_NUMBER, time_s=TIME_S), PIXEL_MM)
     assert LUMINANCE_CD_M2 * found == pytest.approx(BY_HAND, rel=1e-3)
@@ -74,7 +67,7 @@ def test_photons_per_radiance_are_those_by_hand() -> None:
 @pytest.mark.parametrize("cfa", ["GRBG", "none"])
 def test_an_even_light_gives_the_photons_by_hand(lit_evenly: RenderScene, draw: Draw, cfa: str) -> None:
     made = recipe(sensor={"cfa": cfa})
-    counts = counted(draw(made, lit_evenly))
+    counts = counted(draw(made, lit_evenly), made.grid.camera_grid())
     # 4 standard errors of mean and variance of n Poisson numbers, and what was rounded by hand.
     n = counts.size
     allowed = 4 * np.sqrt(BY_HAND / n) + 1e-3 * BY_HAND
@@ -85,8 +78,8 @@ def test_an_even_light_gives_the_photons_by_hand(lit_evenly: RenderScene, draw: 
         assert abs(counts.mean() - wrong) > allowed
     colours = colour_index(64, 80, made.cfa)
     for colour in np.unique(colours):
-        own = counts[:, colours == colour]
-        assert abs(own.mean() - BY_HAND) < 4 * np.sqrt(BY_HAND / own.size) + 1e-3 * BY_HAND
+        part = counts[..., colours == colour]
+        assert abs(part.mean() - BY_HAND) < 4 * np.sqrt(BY_HAND / part.size) + 1e-3 * BY_HAND
 
 
 @pytest.mark.renders

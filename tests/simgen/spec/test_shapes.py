@@ -4,38 +4,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lit_scenes import EVENLY, MATT, build_scene, card
 from PIL import Image
 
 from pcii.base import InputError
 from pcii.types import CameraGrid
-from simgen.renderer import RenderScene, backend, build, render_view
-from simgen.spec import Scene
+from simgen.renderer import RenderScene, render_view
 from simgen.truth import FirstHits, first_hits_at_centre
 
 pytestmark = pytest.mark.renders
 H, W, PIXEL, FOCAL = 90, 120, 0.0704, 50.0
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=FOCAL, pixel_mm=PIXEL, height=H, width=W)
-WHITE = {"reflectance": [1, 1, 1]}
 QUADRANTS = {"texture": "quadrants.png"}
+COLOURS = np.array([[(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 255)]], np.uint8)
 Vector = tuple[float, float, float]
 
 
 def placed(
-    folder: Path, shape: dict, material: dict = WHITE, at: Vector = (0, 0, 600), turn: Vector = (0, 0, 0)
+    folder: Path, shape: dict, material: dict = MATT, at: Vector = (0, 0, 600), turn: Vector = (0, 0, 0)
 ) -> RenderScene:
     """The shape alone in even light; the picture is red and green above, blue and white below."""
-    picture = np.zeros((64, 64, 3), dtype=np.uint8)
-    picture[:32, :32], picture[:32, 32:] = (255, 0, 0), (0, 255, 0)
-    picture[32:, :32], picture[32:, 32:] = (0, 0, 255), (255, 255, 255)
-    Image.fromarray(picture).save(folder / "quadrants.png")
-    other = {"type": "card", "width_mm": 1.0, "height_mm": 1.0}
-    objects = [
-        {"name": "other", "position_mm": (0, 0, 9000), "shape": other, "material": WHITE},
-        {"name": "thing", "position_mm": at, "rotation_deg": turn, "shape": shape, "material": material},
-    ]
-    lights = [{"type": "uniform", "luminance_cd_m2": 100.0}]
-    scene = Scene.model_validate({"title": "t", "objects": objects, "lights": lights})
-    return build(backend.load(), scene, folder, 2)
+    Image.fromarray(COLOURS.repeat(32, axis=0).repeat(32, axis=1)).save(folder / "quadrants.png")
+    thing = {"name": "thing", "position_mm": at, "rotation_deg": turn, "shape": shape, "material": material}
+    return build_scene([card(9000, 1.0, name="other"), thing], [EVENLY], folder=folder)
 
 
 def rays() -> np.ndarray:
@@ -63,8 +54,8 @@ def test_a_boxs_depth_is_exact(turn: float, tmp_path: Path) -> None:
     shape = {"type": "box", "width_mm": size[0], "height_mm": size[1], "depth_mm": size[2]}
     hits = hits_of(placed(tmp_path, shape, at=(8, -5, 600), turn=(0, turn, 0)))
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    own = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])  # from the world's axes to the box's
-    start, along = own @ -centre, rays() @ own.T
+    to_axes = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])  # from the world's axes to the box's
+    start, along = to_axes @ -centre, rays() @ to_axes.T
     with np.errstate(divide="ignore"):
         sides = (np.array([-1, 1])[:, None, None, None] * size / 2 - start) / along
     near, far = sides.min(axis=0).max(axis=-1), sides.max(axis=0).min(axis=-1)
@@ -78,8 +69,8 @@ def test_a_cylinders_depth_is_exact_and_its_ends_are_closed(tilt: float, tmp_pat
     shape = {"type": "cylinder", "radius_mm": radius, "length_mm": length}
     hits = hits_of(placed(tmp_path, shape, at=(8, -5, 600), turn=(tilt, 0, 0)))
     c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
-    own = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
-    start, along = own @ -centre, rays() @ own.T
+    to_axes = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+    start, along = to_axes @ -centre, rays() @ to_axes.T
     a, b = (along[..., [0, 2]] ** 2).sum(-1), along[..., [0, 2]] @ start[[0, 2]]
     root = b**2 - a * ((start[[0, 2]] ** 2).sum() - radius**2)
     width = np.sqrt(np.maximum(root, 0))

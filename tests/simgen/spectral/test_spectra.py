@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lit_scenes import CAMERA, EVENLY, card
 
 from pcii.base import InputError
 from simgen.base import validate
@@ -22,8 +23,6 @@ from simgen.spectral import (
     sensitivity,
 )
 from simgen.spectral.spectra import colour_science, linear_srgb
-
-CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 
 
 @pytest.mark.parametrize("name", ["D65", "A", "FL2", "E"])
@@ -48,7 +47,7 @@ def test_grey_patches_are_grey_and_red_is_red() -> None:
     np.testing.assert_allclose(linear_srgb(np.ones(WAVELENGTH_NM.size)), 1, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("camera", "lamp"), [(CAMERAS[0], "D65"), (CAMERAS[1], "FL2")])
+@pytest.mark.parametrize(("camera", "lamp"), [(CAMERA, "D65"), ("Sigma SDMerill (NPL)", "FL2")])
 def test_drawn_wavelengths_give_what_a_pixel_sees(camera: str, lamp: str) -> None:
     filters = filters_for(sensitivity(camera, Path()), illuminant(lamp))
     light = illuminant(lamp) * patch("cyan")
@@ -118,26 +117,28 @@ def test_a_pixel_that_no_lamp_shines_for_is_dark_and_no_fault() -> None:
 
 
 def scene_of(reflectance: object, lamp: str) -> dict[str, Any]:
-    card = {
-        "name": "card",
-        "position_mm": (0, 0, 500),
-        "shape": {"type": "card", "width_mm": 9, "height_mm": 9},
-        "material": {"reflectance": reflectance},
-    }
-    light = {"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}
-    return {"title": "test", "objects": [card], "lights": [light]}
+    thing = card(500, 9, {"reflectance": reflectance})
+    return {"title": "test", "objects": [thing], "lights": [EVENLY | {"illuminant": lamp}]}
 
 
-def test_names_that_do_not_exist_are_refused_with_their_place_and_a_suggestion() -> None:
-    message = (
-        r"^scene\.toml: 'objects\[0\]\.material\.reflectance': there is no patch 'darkskin'; did you mean"
-    )
+@pytest.mark.parametrize(
+    ("reflectance", "lamp", "message"),
+    [
+        ("darkskin", "D65", r"^s: 'objects\[0\]\.material\.reflectance': there is no patch .* did you mean"),
+        ("dark skin", "D655", r"'lights\[0\]\.illuminant': there is no illuminant .* did you mean"),
+        ({"wavelength_nm": [500, 400], "value": [0.1, 0.2]}, "D65", "must grow"),
+        ({"wavelength_nm": [0.4, 0.7], "value": [0.1, 0.2]}, "D65", "light has 380 to 780 nm"),
+        ([0.1, 0.2], "D65", r"reflectance\[2\]' is missing"),
+    ],
+)
+def test_spectra_of_scenes_that_are_none_are_refused_by_field(
+    reflectance: object, lamp: str, message: str
+) -> None:
     with pytest.raises(InputError, match=message):
-        validate(Scene, scene_of("darkskin", "D65"), "scene.toml")
-    with pytest.raises(
-        InputError, match=r"'lights\[0\]\.illuminant': there is no illuminant .* did you mean"
-    ):
-        validate(Scene, scene_of("dark skin", "D655"), "scene.toml")
+        validate(Scene, scene_of(reflectance, lamp), "s")
+
+
+def test_cameras_and_lamps_that_are_not_known_are_refused() -> None:
     with pytest.raises(InputError, match="did you mean 'Nikon 5100"):
         sensitivity("Nikon 5100", Path())
     with pytest.raises(InputError, match="from 380 to 780 nm"):
@@ -158,16 +159,3 @@ print("colour" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split()[-1] == "False"
-
-
-@pytest.mark.parametrize(
-    ("reflectance", "message"),
-    [
-        ({"wavelength_nm": [500, 400], "value": [0.1, 0.2]}, "must grow"),
-        ({"wavelength_nm": [0.4, 0.7], "value": [0.1, 0.2]}, "light has 380 to 780 nm"),
-        ([0.1, 0.2], r"reflectance\[2\]' is missing"),
-    ],
-)
-def test_bad_reflectances_are_refused_by_field(reflectance: object, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        validate(Scene, scene_of(reflectance, "D65"), "scene.toml")
