@@ -25,13 +25,11 @@ from .sections.reconstruction import reconstruct as reconstruct
 from .store.collection import Collection as Collection, open_collection as open_collection
 from .store.dataset import Dataset as Dataset, open_dataset as open_dataset, sample as sample
 from .store.dataset_writer import save_dataset as save_dataset
-from .store.verification import verify as verify
+from .store.provenance import verify as verify
 from .types.camera_grid import CameraGrid as CameraGrid
 from .types.estimates import DepthMap as DepthMap, DepthPosterior as DepthPosterior, Score as Score
 from .types.estimates import Segmented as Segmented
-from .types.focal_planes import FocalPlanes as FocalPlanes
-from .types.images import Views as Views
+from .types.focal_planes import FocalPlanes as FocalPlanes, Sections as Sections
+from .types.images import Light as Light, Views as Views, limit_photons as limit_photons
 from .types.photon_counts import PhotonCounts as PhotonCounts
-from .types.photon_limit import Light as Light, limit_photons as limit_photons
-from .types.section_stack import Sections as Sections
 from .types.truth import Truth as Truth

@@ -53,8 +53,6 @@ SHARED_ROOMS = {"base", "store", "figures", "types", "exchange"}
 NOT_SHARED = {
     "pcii.types.estimates",
     "pcii.types.focal_planes",
-    "pcii.types.geometry",
-    "pcii.types.section_stack",
     "pcii.evidence.camera_fit",
     "pcii.store.suggested_depths",
 }

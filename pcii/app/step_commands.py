@@ -22,6 +22,7 @@ from pcii.metrics import scoring
 from pcii.removal import methods as removal
 from pcii.sections import reconstruct as reconstruct_sections
 from pcii.store import (
+    RESULTS_FOLDER,
     Dataset,
     depth_range_of,
     differences,
@@ -29,7 +30,6 @@ from pcii.store import (
     open_dataset,
     own_software,
     planes_of,
-    read_results,
 )
 from pcii.types import DepthMap, FocalPlanes, Light, Segmented
 
@@ -206,7 +206,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
-    data, manifest = open_dataset(dataset), read_results(out)
+    data, manifest = open_dataset(dataset), RESULTS_FOLDER.read(out)
     data = data if manifest.light is None else data.at_light(Light.parse(manifest.light))
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):

@@ -1,40 +1,48 @@
-"""Datasets: counts, truth and radiance of a dataset folder, each checked when it is read."""
+"""Datasets: counts, truth and radiance of a dataset folder, each checked when it is read.
+
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
+    counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts.zarr/frame        (photon,) the frame of each count, on request
+    counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
+    photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
+    truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
+    radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
+    arrays.zip               in place of the .zarr folders, where many small files would be a burden
+
+The archive is a ZIP file as the zip stores of Zarr are: without compression, since chunks are compressed
+already. Its members are in order and without dates, so that the same arrays make the same bytes.
+
+A dataset without a manifest is unfinished, a file whose hash differs is damaged, and what is not listed is
+not read.
+"""
 
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, new_folder_safely, times
-from pcii.store.dataset_layout import (
+from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
+from pcii.store.manifests import MANIFEST, DatasetManifest, read_manifest
+from pcii.store.stored_arrays import (
     ARRAYS,
-    COUNTS,
-    FRAME,
-    MANIFEST,
-    PHOTON_TRUTH,
-    RADIANCE,
-    TRUTH,
-    nested_name,
-    radiance_name,
+    COUNTS_LABELS,
+    PHOTON_TRUTH_LABELS,
+    TRUTH_LABELS,
+    Label,
+    read_array,
     read_exr,
-    read_manifest,
     read_packed,
 )
-from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
-from pcii.store.zarr_groups import read_array
 from pcii.types import (
-    COUNTS_LABELS,
     EXPOSURE,
     FULL_LIGHT,
     OPTIONAL_MAPS,
-    PHOTON_TRUTH_LABELS,
-    TRUTH_LABELS,
     CameraGrid,
-    Label,
     Light,
     PhotonCounts,
     PhotonTruth,
@@ -42,10 +50,34 @@ from pcii.types import (
     Views,
 )
 
-if TYPE_CHECKING:
-    from pcii.store.manifests import DatasetManifest
-
+COUNTS = "counts.zarr"
+FRAME = "frame"
+"""Array of the counts that has the frame of each."""
+TRUTH = "truth.zarr"
+PHOTON_TRUTH = "photon_truth.zarr"
+RADIANCE = "radiance"
 SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
+
+
+def radiance_name(k: int, l: int) -> str:
+    """Path of the radiance of a view in the dataset.
+
+    >>> radiance_name(0, 12)
+    'radiance/view_00_12.exr'
+    """
+    return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
+
+
+def nested_name(part: str, budget: float | None) -> str:
+    """Name of an array group for a nested photon budget; unchanged for None.
+
+    >>> nested_name("counts.zarr", 300.0)
+    'counts-300.zarr'
+    """
+    if budget is None:
+        return part
+    stem, suffix = part.rsplit(".", 1)
+    return f"{stem}-{budget:.12g}.{suffix}"
 
 
 class StoredRadiance:
@@ -82,7 +114,7 @@ class Dataset(ShortForm):
     """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
 
     path: Path
-    manifest: "DatasetManifest"
+    manifest: DatasetManifest
     choice: Light | None = None
     """The light of a nested budget, or full light; None for all photons or, without any, the radiance."""
 

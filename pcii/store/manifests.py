@@ -1,12 +1,22 @@
-"""Manifests as pydantic models; members that they do not name are kept.
+"""The documents that make folders finished ones: what they hold, how they are written and read.
 
-Imported when a manifest is read, not with the package: pydantic takes a tenth of a second to load.
+manifest.json     of a dataset, written last: what it does not list does not belong to the dataset
+collection.json   of a collection: the recipe that its datasets have in common, and the fields that differ
+results.json      of results: their dataset by name and identity, the light, the software
+evaluation.json   of an evaluation: what measured its rows; beside it rows.jsonl, a line of JSON for each
+                  dataset, light and method
+
+A document is JSON: its format and version and, of all kinds but collections, every file with size and
+SHA-256. It ends in "sha256", a checksum of itself: the SHA-256 of its bytes with 64 zeros in that place.
+Members that the models here do not name are kept.
 """
 
+import json
 import re
 from collections.abc import Mapping
-from pathlib import PurePosixPath
-from typing import Annotated, Any, Literal, TypeVar
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -19,9 +29,22 @@ from pydantic import (
 )
 from typing_extensions import TypedDict  # pydantic takes that of the standard library from Python 3.12 on
 
-from pcii.base import InputError, visible
+from pcii.base import InputError, json_bytes, visible, write_bytes_safely
+from pcii.store.folders import REMEDY, entries, hash_bytes, read_small
 from pcii.types import MOST_BITS, MOST_DEPTHS, MOST_FRAMES, MOST_PHOTONS, CameraGrid, Scope, check_cfa
 
+MANIFEST = "manifest.json"
+MARKER = ".unfinished.json"
+"""Present in the folder of a dataset while it is being generated."""
+COLLECTION = "collection.json"
+LOCK = ".lock"
+"""Locked while a run writes to the folder of a collection, and then removed."""
+RESULTS = "results.json"
+EVALUATION = "evaluation.json"
+ROWS = "rows.jsonl"
+LARGEST_DOCUMENT_BYTES = 1 << 27
+"""JSON takes up to 30 times its length in memory."""
+_NO_CHECKSUM = "0" * 64
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
 
@@ -157,6 +180,7 @@ class EvaluationManifest(Manifest):
 
 
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
+AnyManifest = TypeVar("AnyManifest", bound=Manifest)
 
 
 def validated(model: type[AnyModel], document: Mapping[str, Any]) -> AnyModel:
@@ -172,3 +196,81 @@ def first_fault(fault: ValidationError) -> str:
     first = fault.errors(include_url=False)[0]
     member = ".".join(str(step) for step in first["loc"] if step != "[key]")
     return visible(": ".join(filter(None, (member, first["msg"].removeprefix("Value error, ")))))
+
+
+@dataclass(frozen=True)
+class FolderKind(Generic[AnyManifest]):
+    """A kind of folder, such as that of a dataset, and the document that makes a folder a finished one."""
+
+    model: type[AnyManifest]
+    what: str
+    document: str
+    version: int
+    command: str
+    """The command that makes such folders."""
+    marks: frozenset[str]
+    """Files of which every such folder has one, finished or not."""
+
+    @property
+    def format(self) -> str:
+        """Name of the document's format."""
+        return f"photon-integral-imaging {self.what}"
+
+    def guard(self, folder: Path) -> set[str]:
+        """Names of what is in a folder to be written to: none in a new one, else those of one of this kind.
+
+        Raises `InputError` for a file, and for a folder that holds something else.
+        """
+        left_by_a_kill = f".{self.document}."
+        names = {name for name in entries(folder, self.what) if not name.startswith((LOCK, left_by_a_kill))}
+        if names and not names & self.marks:
+            raise InputError(f"{folder}: holds something else; name a new or empty folder")
+        return names
+
+    def write(self, folder: Path, content: Mapping[str, Any]) -> None:
+        """Write the document, atomically."""
+        document = {"format": self.format, "format_version": self.version, **content}
+        blank = json_bytes({**document, "sha256": _NO_CHECKSUM})
+        before, after = blank.rsplit(_NO_CHECKSUM.encode(), 1)
+        write_bytes_safely(folder / self.document, before + hash_bytes(blank).encode() + after)
+
+    def read(self, folder: Path) -> AnyManifest:
+        """The document; `InputError` if it is missing, changed, or of another format or content."""
+        path = folder / self.document
+        if not folder.is_dir():
+            raise InputError(f"{folder}: there is no such {self.what} folder")
+        if not path.is_file():
+            raise InputError(
+                f"{folder}: not a finished {self.what} (no {self.document}); `{self.command}` makes one"
+            )
+        content = read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY)
+        try:
+            document = json.loads(content)
+            checksum = document.pop("sha256").encode()
+            before, _, after = content.rpartition(checksum)
+            if hash_bytes(before + _NO_CHECKSUM.encode() + after).encode() != checksum:
+                raise ValueError("its checksum does not match")
+            if (document.get("format"), document.get("format_version")) != (self.format, self.version):
+                raise ValueError(f"expected a {self.format} of version {self.version}")
+            return validated(self.model, document)
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as fault:
+            raise InputError(f"{path}: damaged, or of another release ({fault}); {REMEDY}") from None
+
+
+DATASET_FOLDER = FolderKind(
+    DatasetManifest, "dataset", MANIFEST, 2, "simgen generate", frozenset({MANIFEST, MARKER})
+)
+COLLECTION_FOLDER = FolderKind(
+    CollectionManifest, "collection", COLLECTION, 1, "simgen generate", frozenset({COLLECTION})
+)
+RESULTS_FOLDER = FolderKind(ResultsManifest, "results", RESULTS, 4, "pcii run", frozenset({RESULTS}))
+EVALUATION_FOLDER = FolderKind(
+    EvaluationManifest, "evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS})
+)
+
+
+def read_manifest(root: Path) -> DatasetManifest:
+    """The manifest of a finished dataset; `InputError` if it is unfinished, or the manifest is damaged."""
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
+    return DATASET_FOLDER.read(root)

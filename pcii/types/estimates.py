@@ -8,8 +8,7 @@ import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, span, times
 from pcii.types.arrays import Plottable, read_only
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.section_stack import Sections
+from pcii.types.focal_planes import FocalPlanes, Sections
 
 
 @dataclass(frozen=True, eq=False, repr=False)

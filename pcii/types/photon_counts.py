@@ -9,9 +9,8 @@ import numpy as np
 
 from pcii.base import InputError, ShortForm, times
 from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
-from pcii.types.bayer import channel_count, check_cfa, colour_cells
 from pcii.types.camera_grid import CameraGrid
-from pcii.types.readout import PLAIN, Readout
+from pcii.types.sensor import PLAIN, Readout, channel_count, check_cfa, colour_cells
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,7 +11,7 @@ from digests import digest
 from tiny import GRID_2_X_3
 
 from pcii.base import Executor, InputError, WorkerLostError, command_line, locked
-from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, software, verify
+from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, provenance, verify
 from simgen.app import commands as cli
 from simgen.dataset import dataset_collection, generate, generate_collection
 from simgen.spec import Sweep, load_recipe, load_sweep
@@ -130,8 +130,8 @@ def test_another_recipe_a_dataset_and_a_file_are_refused(
 def test_other_software_does_not_extend_a_collection(
     recipe_file: Path, collection: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = software.version
-    monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
+    original = provenance.version
+    monkeypatch.setattr(provenance, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)
 

@@ -1,4 +1,7 @@
-"""Frames of a single-photon camera, and the photons that their counts stand for.
+"""What a sensor records: one colour of each pixel, in frames of few bits.
+
+A Bayer pattern is named by its first two rows, read left to right, top to bottom: in ``GRBG`` the pixel
+(0, 0) is green, (0, 1) red, (1, 0) blue and (1, 1) green (Muniraj et al. 2017, Fig. 3).
 
 A single-photon camera divides the exposure into T equal frames. In each a pixel stops at m = 2^bits - 1
 counts; of one bit it shows whether there was a photon at all. With mu photons expected in a frame the number
@@ -14,6 +17,9 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types.arrays import is_whole
 
+COLOURS = "RGB"
+PATTERNS = ("GRBG", "RGGB", "BGGR", "GBRG")
+
 MOST_FRAMES = 1 << 24
 """At 100 000 frames a second, three minutes."""
 
@@ -25,6 +31,75 @@ variance of counts are each too small by this share, less than the noise of eith
 
 NEWTON_STEPS = 100
 """A mean within 1e-12 of the limit of 2 to 32 bits takes 36 at most."""
+
+
+def check_cfa(cfa: str | None) -> str | None:
+    """Return `cfa` if it names a Bayer pattern or is None (monochrome), else raise `InputError`."""
+    if cfa is None or cfa in PATTERNS:
+        return cfa
+    raise InputError(
+        f"cfa: there is no Bayer pattern {cfa!r}; use one of {', '.join(PATTERNS)}, "
+        "or none (None in Python) for a monochrome sensor"
+    )
+
+
+def channel_count(cfa: str | None) -> int:
+    """Number of colours of a pattern: 3, or 1 for a monochrome sensor (None)."""
+    return 1 if cfa is None else 3
+
+
+def colour_cells(cfa: str | None) -> np.ndarray:
+    """Colour of each cell of the 2 x 2 pattern, shape (2, 2), int; 0, 1, 2 = R, G, B.
+
+    A monochrome sensor has the single colour 0 everywhere. Raises `InputError` for an unknown pattern.
+
+    >>> colour_cells("GRBG").tolist()
+    [[1, 0], [2, 1]]
+    """
+    check_cfa(cfa)
+    if cfa is None:
+        return np.zeros((2, 2), dtype=np.int64)
+    return np.array([COLOURS.index(letter) for letter in cfa], dtype=np.int64).reshape(2, 2)
+
+
+def colour_index(height: int, width: int, cfa: str | None) -> np.ndarray:
+    """Colour that each pixel records, shape (height, width), uint8; 0, 1, 2 = R, G, B."""
+    cells = colour_cells(cfa).astype(np.uint8)
+    return np.tile(cells, ((height + 1) // 2, (width + 1) // 2))[:height, :width]
+
+
+def colours_and_samples(
+    light: np.ndarray, cfa: str | None, samples: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Light and number of samples, (H, W, C) each, of an image (H, W, C) that may be a mosaic.
+
+    `samples` (H, W, C) are those of the image, by default one everywhere. A pixel of a mosaic is 0 in the
+    colours that it does not record.
+
+    >>> colours_and_samples(np.array([[[2], [4]]]), "GRBG")[0].tolist()
+    [[[0, 2, 0], [4, 0, 0]]]
+    """
+    samples = np.ones(light.shape, dtype=np.int64) if samples is None else samples
+    if cfa is None:
+        return light, samples
+    is_recorded = colour_index(light.shape[0], light.shape[1], cfa)[..., None] == np.arange(3)
+    return light * is_recorded, samples * is_recorded
+
+
+def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
+    """Bayer mosaic (..., H, W) of a colour image (..., H, W, 3), same dtype: one colour of each pixel.
+
+    Raises `InputError` for another shape or an unknown pattern.
+
+    >>> mosaic(np.array([[[1, 2, 3], [4, 5, 6]]]), "GRBG")
+    array([[2, 4]])
+    """
+    if rgb.ndim < 3 or rgb.shape[-1] != 3:
+        raise InputError(f"rgb: expected an array (..., H, W, 3), got shape {rgb.shape}")
+    raw = np.empty(rgb.shape[:-1], dtype=rgb.dtype)
+    for (a, b), colour in np.ndenumerate(colour_cells(cfa)):
+        raw[..., a::2, b::2] = rgb[..., a::2, b::2, colour]
+    return raw
 
 
 @dataclass(frozen=True)
