@@ -1,8 +1,8 @@
 __version__: str
 __all__: list[str]
 
-from .base.errors import InputError as InputError
-from .base.srgb import srgb_to_linear as srgb_to_linear
+from .base.pixel_arithmetic import srgb_to_linear as srgb_to_linear
+from .base.plain_text import InputError as InputError
 from .depth.methods import depth_methods as depth_methods, depth_posterior as depth_posterior
 from .depth.methods import estimate_depth as estimate_depth
 from .evaluation.comparison import evaluate as evaluate

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from pcii.base.errors import InputError
+from pcii.base.plain_text import InputError
 
 
 def write_bytes_safely(path: Path, content: bytes) -> None:

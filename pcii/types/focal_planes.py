@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, times
-from pcii.types.arrays import Plottable, check_z_mm, read_only
+from pcii.types.arrays import Plottable, check_z_mm, freeze_array, read_only
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts, PhotonEvents
@@ -99,8 +99,8 @@ class FocalPlanes(ShortForm):
     """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "z_mm", read_only(self.z_mm))
-        object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
+        freeze_array(self, "z_mm", "real numbers", ("Z",))
+        freeze_array(self, "total_disparity_px", "real numbers", self.z_mm.shape)
         across, down = np.abs(disparity_px(self.grid, self.z_mm))
         with np.errstate(over="ignore"):
             countable = np.maximum(across * self.grid.cols, down * self.grid.rows) < 2**31
@@ -117,7 +117,7 @@ class FocalPlanes(ShortForm):
         >>> grid = CameraGrid(
         ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
         ... )
-        >>> FocalPlanes.at_depths(grid, [500, 1000]).whole_shifts_px[1].tolist()
+        >>> FocalPlanes.at_depths(grid, [500, 1000]).nearest_shifts_px()[1].tolist()
         [[-10, 0, 10], [-5, 0, 5]]
         """
         if isinstance(z_mm, FocalPlanes):
@@ -173,13 +173,7 @@ class FocalPlanes(ShortForm):
         cols = (np.arange(self.grid.cols) - (self.grid.cols - 1) / 2) * across[:, None]
         return read_only(rows), read_only(cols)
 
-    @cached_property
-    def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The shifts of rows (Z, K) and columns (Z, L) to whole pixels, floor(x + `rounding`), int32."""
-        rows, cols = self.nearest_shifts_px(1)
-        return read_only(rows.astype(np.int32)), read_only(cols.astype(np.int32))
-
-    def nearest_shifts_px(self, step_px: int) -> tuple[np.ndarray, np.ndarray]:
+    def nearest_shifts_px(self, step_px: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """The shifts of rows (Z, K) and columns (Z, L) to multiples of `step_px`, int64.
 
         They are the nearest for a `rounding` of 1/2: `floor(x + 1/2)` and not `round`, which rounds half to
@@ -240,16 +234,12 @@ class Sections(Plottable):
 
     def __post_init__(self) -> None:
         Z, H, W = len(self.planes), self.grid.height * self.subpixel, self.grid.width * self.subpixel
-        if self.counts.shape[:3] != (Z, H, W) or self.counts.ndim != 4:
-            raise InputError(f"counts: expected ({Z}, {H}, {W}, C), got {self.counts.shape}")
-        object.__setattr__(self, "counts", read_only(self.counts))
+        freeze_array(self, "counts", "real numbers", (Z, H, W, "C"))
         if isinstance(self.samples, np.ndarray):
             self.coverage  # noqa: B018 an array of another shape is reported here
         check_cfa(self.cfa)
         if self.variance is not None:
-            if self.variance.shape != self.counts.shape:
-                raise InputError("variance: must have the shape of counts")
-            object.__setattr__(self, "variance", read_only(self.variance))
+            freeze_array(self, "variance", "real numbers", self.counts.shape)
 
     def _facts(self) -> dict[str, object]:
         photons = None
