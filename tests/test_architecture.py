@@ -54,7 +54,6 @@ NOT_SHARED = {
     "pcii.types.estimates",
     "pcii.types.focal_planes",
     "pcii.evidence.camera_fit",
-    "pcii.store.suggested_depths",
 }
 OUTSIDE = "tests", "benchmarks", "docs", "examples", "packaging", "scenes", "training"
 MOST_FILES, FEWEST_FILES = 14, 2

@@ -23,7 +23,7 @@ from pcii.evaluation.submissions import (
     read_submission,
     tasks_of_submission,
 )
-from pcii.sections import reconstruct
+from pcii.sections import planes_of, reconstruct
 from pcii.store import (
     BENCHMARK_FIELDS,
     COLLECTION_FOLDER,
@@ -33,7 +33,6 @@ from pcii.store import (
     Half,
     is_collection,
     open_collection,
-    planes_of,
     validated,
 )
 from pcii.types import FULL_LIGHT, DepthMap, Light, Segmented

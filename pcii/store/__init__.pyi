@@ -10,7 +10,7 @@ from .dataset import SAMPLE as SAMPLE, TRUTH as TRUTH, copy_sample as copy_sampl
 from .dataset import open_dataset as open_dataset, radiance_name as radiance_name, sample as sample
 from .dataset_card import CARD as CARD, LICENCE as LICENCE, Terms as Terms, write_card as write_card
 from .dataset_card import write_licence as write_licence
-from .dataset_writer import check_depth_range as check_depth_range, save_dataset as save_dataset
+from .dataset_writer import save_dataset as save_dataset
 from .dataset_writer import write_counts as write_counts
 from .folders import Files as Files, check_free as check_free, check_size as check_size, entries as entries
 from .folders import hash_file as hash_file, hash_json as hash_json, list_files as list_files
@@ -33,5 +33,3 @@ from .stored_arrays import TRUTH_LABELS as TRUTH_LABELS, new_array as new_array
 from .stored_arrays import new_group_safely as new_group_safely, pack_arrays as pack_arrays
 from .stored_arrays import read_array as read_array, read_exr as read_exr
 from .stored_arrays import write_arrays_safely as write_arrays_safely, write_exr_safely as write_exr_safely
-from .suggested_depths import depth_range_of as depth_range_of, has_depths as has_depths
-from .suggested_depths import planes_of as planes_of

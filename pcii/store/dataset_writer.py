@@ -29,7 +29,7 @@ from pcii.store.stored_arrays import (
     write_arrays_safely,
     write_exr_safely,
 )
-from pcii.types import OPTIONAL_MAPS, PhotonCounts, PhotonTruth, Truth, Views, check_z_mm
+from pcii.types import OPTIONAL_MAPS, PhotonCounts, PhotonTruth, Truth, Views, check_depth_range, check_z_mm
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
@@ -81,7 +81,7 @@ def save_dataset(
     maps = _stored_maps(truth, view_z_mm, counts or views)
     analysis: dict[str, Any] = {} if z_mm is None else {"z_mm": check_z_mm(z_mm).tolist()}
     if z_range_mm is not None:
-        analysis["z_range_mm"] = check_depth_range(z_range_mm)
+        analysis["z_range_mm"] = list(check_depth_range(z_range_mm))
     out = Path(path).absolute()
     check_free(out, "dataset")
     with named_in_errors(out):
@@ -133,14 +133,6 @@ def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None
         if views.radiance.shape[4] == 1 and counts.cfa != views.cfa:
             raise InputError(f"images: expected the same Bayer pattern, got {counts.cfa} and {views.cfa}")
     return counts, views
-
-
-def check_depth_range(z_range_mm: object) -> list[float]:
-    """The nearest and farthest depth in mm; raises `InputError` for anything else."""
-    depths = check_z_mm(z_range_mm).tolist()
-    if len(depths) != 2 or depths[0] >= depths[1]:
-        raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
-    return depths
 
 
 def _stored_maps(truth: Truth | None, view_z_mm: np.ndarray | None, images: Any) -> dict[str, np.ndarray]:

@@ -1,4 +1,9 @@
-from .arrays import LARGEST_COUNT as LARGEST_COUNT, MOST_DEPTHS as MOST_DEPTHS, check_z_mm as check_z_mm
+from .arrays import (
+    LARGEST_COUNT as LARGEST_COUNT,
+    MOST_DEPTHS as MOST_DEPTHS,
+    check_depth_range as check_depth_range,
+    check_z_mm as check_z_mm,
+)
 from .arrays import is_whole as is_whole, read_only as read_only, whole_counts as whole_counts
 from .camera_grid import CameraGrid as CameraGrid
 from .estimates import DepthMap as DepthMap, DepthPosterior as DepthPosterior, Score as Score

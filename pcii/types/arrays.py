@@ -104,6 +104,17 @@ def check_z_mm(z_mm: object) -> np.ndarray:
     return z
 
 
+def check_depth_range(z_range_mm: object) -> tuple[float, float]:
+    """The nearest and farthest depth in mm of a range; raises `InputError` for anything else."""
+    depths = check_z_mm(z_range_mm).tolist()
+    if len(depths) != 2:
+        raise InputError(f"z_range_mm: expected two depths in mm, (near, far), got {z_range_mm!r}")
+    near, far = depths
+    if near >= far:
+        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    return near, far
+
+
 def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`.
 
