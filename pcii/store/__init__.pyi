@@ -15,11 +15,11 @@ from .dataset_writer import write_counts as write_counts
 from .folders import Files as Files, check_free as check_free, check_size as check_size, entries as entries
 from .folders import hash_file as hash_file, hash_json as hash_json, list_files as list_files
 from .folders import lists_part as lists_part, read_listed as read_listed, read_part as read_part
-from .folders import read_small as read_small, unlisted_files as unlisted_files
+from .folders import unlisted_files as unlisted_files
 from .manifests import COLLECTION as COLLECTION, COLLECTION_FOLDER as COLLECTION_FOLDER
 from .manifests import DATASET_FOLDER as DATASET_FOLDER, DatasetManifest as DatasetManifest
 from .manifests import EVALUATION_FOLDER as EVALUATION_FOLDER
-from .manifests import LARGEST_DOCUMENT_BYTES as LARGEST_DOCUMENT_BYTES, LOCK as LOCK, MANIFEST as MANIFEST
+from .manifests import LOCK as LOCK, MANIFEST as MANIFEST
 from .manifests import MARKER as MARKER, OPEN as OPEN, RESULTS as RESULTS, RESULTS_FOLDER as RESULTS_FOLDER
 from .manifests import ROWS as ROWS, Text as Text, first_fault as first_fault, read_manifest as read_manifest
 from .manifests import validated as validated

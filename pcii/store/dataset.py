@@ -16,7 +16,9 @@ A dataset without a manifest is unfinished, a file whose hash differs is damaged
 not read.
 """
 
+import io
 import shutil
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -36,7 +38,6 @@ from pcii.store.stored_arrays import (
     Label,
     read_array,
     read_exr,
-    read_packed,
 )
 from pcii.types import (
     EXPOSURE,
@@ -94,8 +95,6 @@ class StoredRadiance:
         if index not in np.ndindex(K, L):
             raise InputError(f"radiance: read one of {K} x {L} views by [k, l], or all by numpy.asarray")
         name = radiance_name(*index)
-        if name not in self._files:
-            raise InputError(f"{self._root}: the manifest lists no {name}")
         content = read_listed(self._root, name, self._files[name])
         return read_exr(self._root / name, self.shape[2:], content)
 
@@ -204,14 +203,12 @@ class Dataset(ShortForm):
         if self.has(f"{part}/{FRAME}"):
             names += (FRAME,)
         arrays = self._arrays(part, COUNTS_LABELS, names)
-        readout: dict[str, Any] = {"frames": self.manifest.frames, "bits": self.manifest.bits}
+        film: dict[str, Any] = {"grid": self.grid, "cfa": self.cfa}
+        film |= {"frames": self.manifest.frames, "bits": self.manifest.bits}
         try:
             if "dense" in arrays:
-                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **readout)
-            k, l, i, j, n = (arrays[name] for name in "klijn")
-            return PhotonCounts.from_events(
-                k, l, i, j, n, self.grid, cfa=self.cfa, frame=arrays.get(FRAME), **readout
-            )
+                return PhotonCounts.from_dense(arrays["dense"], **film)
+            return PhotonCounts.from_events(**arrays, **film)
         except InputError as fault:
             raise InputError(f"{self.path / part}: {fault}") from None
 
@@ -279,12 +276,9 @@ class Dataset(ShortForm):
     @cached_property
     def _packed(self) -> dict[str, bytes]:
         """Content of all packed files by their paths."""
-        if ARRAYS not in self.manifest.files:
-            raise InputError(
-                f"{self.path / MANIFEST}: files: there is no {ARRAYS}, which is to hold what is packed"
-            )
-        archive = read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS])
-        return read_packed(self.path / ARRAYS, archive, self.manifest.packed)
+        archive = io.BytesIO(read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS]))
+        with zipfile.ZipFile(archive) as members:
+            return {name: members.read(name) for name in self.manifest.packed}
 
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]

@@ -62,10 +62,7 @@ def check_size(root: Path, name: str, entry: Mapping[str, Any]) -> None:
 def read_listed(root: Path, name: str, entry: Mapping[str, Any]) -> bytes:
     """Content of a listed file; `InputError` if it is missing, or has another size or hash."""
     check_size(root, name, entry)
-    try:
-        content = (root / name).read_bytes()
-    except OSError as fault:
-        raise InputError(f"{root / name}: cannot be read ({fault.strerror}); {REMEDY}") from None
+    content = (root / name).read_bytes()
     if hash_bytes(content) != entry["sha256"]:
         raise InputError(f"{root / name}: its content does not match the manifest's SHA-256; {REMEDY}")
     return content
@@ -81,20 +78,6 @@ def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
     """Paths, relative to `root`, of the files in it that are not listed."""
     present = {path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()}
     return sorted(present - set(listed))
-
-
-def read_small(path: Path, limit: int, remedy: str) -> bytes:
-    """Content of a regular file of at most `limit` bytes; raises `InputError` for any other."""
-    if not path.is_file():
-        raise InputError(f"{path}: missing; {remedy}")
-    try:
-        with path.open("rb") as file:
-            content = file.read(limit + 1)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
-    if len(content) > limit:
-        raise InputError(f"{path}: larger than the {limit} bytes that such a file has at most; {remedy}")
-    return content
 
 
 def entries(folder: Path, what: str) -> set[str]:

@@ -30,7 +30,7 @@ from pydantic import (
 from typing_extensions import TypedDict  # pydantic takes that of the standard library from Python 3.12 on
 
 from pcii.base import InputError, json_bytes, visible, write_bytes_safely
-from pcii.store.folders import REMEDY, entries, hash_bytes, read_small
+from pcii.store.folders import REMEDY, entries, hash_bytes
 from pcii.types import MOST_BITS, MOST_DEPTHS, MOST_FRAMES, MOST_PHOTONS, CameraGrid, Scope, check_cfa
 
 MANIFEST = "manifest.json"
@@ -42,8 +42,6 @@ LOCK = ".lock"
 RESULTS = "results.json"
 EVALUATION = "evaluation.json"
 ROWS = "rows.jsonl"
-LARGEST_DOCUMENT_BYTES = 1 << 27
-"""JSON takes up to 30 times its length in memory."""
 _NO_CHECKSUM = "0" * 64
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -243,7 +241,7 @@ class FolderKind(Generic[AnyManifest]):
             raise InputError(
                 f"{folder}: not a finished {self.what} (no {self.document}); `{self.command}` makes one"
             )
-        content = read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY)
+        content = path.read_bytes()
         try:
             document = json.loads(content)
             checksum = document.pop("sha256").encode()

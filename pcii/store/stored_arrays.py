@@ -91,8 +91,6 @@ SECTIONS_LABELS = {
     "z_mm": _Z_MM,
     "counts": Label((*PLANE_AXES, "channel"), "sum of the samples that meet at each voxel", "photons"),
     "coverage": Label((*PLANE_AXES, "channel"), "how many samples that was", "samples"),
-    "estimate": Label((*PLANE_AXES, "channel"), "mean of the samples", "photons"),
-    "variance": Label((*PLANE_AXES, "channel"), "variance of the samples", "photons^2"),
 }
 SEGMENTED_LABELS = {
     "z_mm": _Z_MM,
@@ -260,12 +258,3 @@ def pack_arrays(root: Path, parts: Iterable[str]) -> list[str]:
     for part in parts:
         shutil.rmtree(root / part, ignore_errors=True)
     return names
-
-
-def read_packed(path: Path, archive: bytes, names: Iterable[str]) -> dict[str, bytes]:
-    """Content of files in the archive that was read from `path`; `InputError` for one that is missing."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(archive)) as members:
-            return {name: members.read(name) for name in names}
-    except (KeyError, zipfile.BadZipFile) as fault:
-        raise InputError(f"{path}: cannot be read ({fault}); {REMEDY}") from None

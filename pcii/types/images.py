@@ -213,7 +213,7 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
     if has_one_channel and cfa not in (None, views.cfa):
         raise InputError(f"cfa: views of one channel are of a {views.cfa or 'mono'} sensor, not {cfa}")
     pattern, grid = views.cfa or cfa, views.grid
-    columns: list[list[np.ndarray]] = []
+    columns: list[np.ndarray] = []
     for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
         raw = sense(views.view(k, l), pattern)
         if raw.min() < 0:
@@ -222,6 +222,5 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
         counts = rng.poisson(rates)
         i, j = np.nonzero(counts)
-        columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
-    k, l, i, j, n = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return PhotonCounts.from_events(k, l, i, j, n, grid, cfa=pattern)
+        columns.append(np.stack([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]]))
+    return PhotonCounts.from_events(*np.concatenate(columns, axis=1), grid, cfa=pattern)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pcii.base import InputError, ShortForm, times
-from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
+from pcii.types.arrays import Plottable, read_only, whole_counts
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.sensor import PLAIN, Readout, channel_count, check_cfa, colour_cells
 
@@ -274,7 +274,9 @@ class PhotonCounts(Plottable):
         ([[0.288, 0.693]], [[0.0, inf]])
         """
         image, number = self.view(k, l), self.readout.frames
-        first, end = (0, number) if frames is None else _checked_range(frames, number)
+        first, end = frames or (0, number)
+        if not 0 <= first < end <= number:
+            raise InputError(f"frames: expected (first, end), 0 <= first < end <= {number}, got {frames!r}")
         if end - first < number:
             if self.frame is None:
                 raise InputError(f"frames: only the sums over all {number} frames were stored")
@@ -326,10 +328,3 @@ def _check_sensor(grid: object, cfa: str | None) -> None:
     if not isinstance(grid, CameraGrid):
         raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
     check_cfa(cfa)
-
-
-def _checked_range(frames: object, number: int) -> tuple[int, int]:
-    match frames:
-        case (first, end) if is_whole(first) and is_whole(end) and 0 <= first < end <= number:
-            return first, end
-    raise InputError(f"frames: expected (first, end) with 0 <= first < end <= {number}, got {frames!r}")
