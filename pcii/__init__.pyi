@@ -26,7 +26,7 @@ from .store.collection import Collection as Collection, open_collection as open_
 from .store.dataset import Dataset as Dataset, open_dataset as open_dataset, sample as sample
 from .store.dataset_writer import save_dataset as save_dataset
 from .store.provenance import verify as verify
-from .types.camera_grid import CameraGrid as CameraGrid
+from .types.cameras import CameraGrid as CameraGrid
 from .types.estimates import DepthMap as DepthMap, DepthPosterior as DepthPosterior, Score as Score
 from .types.estimates import Segmented as Segmented
 from .types.focal_planes import FocalPlanes as FocalPlanes, Sections as Sections

@@ -52,20 +52,12 @@ def _figure(value: object) -> object:
 
 
 def times(shape: Sequence[int]) -> str:
-    """A shape as text.
-
-    >>> times((10, 10, 64, 64))
-    '10 x 10 x 64 x 64'
-    """
+    """A shape as text, such as "10 x 10 x 64 x 64"."""
     return " x ".join(map(str, shape))
 
 
 def span(values: np.ndarray) -> str | None:
-    """The range of the values as text; None for an empty array.
-
-    >>> span(np.array([620.0, 540.0, 580.0]))
-    '540 to 620'
-    """
+    """The range of the values as text, such as "540 to 620"; None for an empty array."""
     return f"{values.min():g} to {values.max():g}" if values.size else None
 
 

@@ -16,13 +16,13 @@ from .folders import Files as Files, check_free as check_free, check_size as che
 from .folders import hash_file as hash_file, hash_json as hash_json, list_files as list_files
 from .folders import lists_part as lists_part, read_listed as read_listed, read_part as read_part
 from .folders import unlisted_files as unlisted_files
-from .manifests import COLLECTION as COLLECTION, COLLECTION_FOLDER as COLLECTION_FOLDER
-from .manifests import DATASET_FOLDER as DATASET_FOLDER, DatasetManifest as DatasetManifest
-from .manifests import EVALUATION_FOLDER as EVALUATION_FOLDER
-from .manifests import LOCK as LOCK, MANIFEST as MANIFEST
-from .manifests import MARKER as MARKER, OPEN as OPEN, RESULTS as RESULTS, RESULTS_FOLDER as RESULTS_FOLDER
-from .manifests import ROWS as ROWS, Text as Text, first_fault as first_fault, read_manifest as read_manifest
-from .manifests import validated as validated
+from .folders import COLLECTION as COLLECTION, COLLECTION_FOLDER as COLLECTION_FOLDER
+from .folders import DATASET_FOLDER as DATASET_FOLDER, DatasetManifest as DatasetManifest
+from .folders import EVALUATION_FOLDER as EVALUATION_FOLDER
+from .folders import LOCK as LOCK, MANIFEST as MANIFEST
+from .folders import MARKER as MARKER, OPEN as OPEN, RESULTS as RESULTS, RESULTS_FOLDER as RESULTS_FOLDER
+from .folders import ROWS as ROWS, Text as Text, first_fault as first_fault, read_manifest as read_manifest
+from .folders import validated as validated
 from .provenance import PACKAGE as PACKAGE, differences as differences, machine as machine
 from .provenance import own_software as own_software, print_verification as print_verification
 from .provenance import software_with as software_with, verify as verify

@@ -12,13 +12,13 @@ all the manifests, and the hash of each.
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from pcii.base import InputError, ShortForm, listed, write_bytes_safely
 from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.folders import hash_bytes, hash_file
-from pcii.store.manifests import COLLECTION, COLLECTION_FOLDER, MANIFEST, DatasetManifest
+from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, DatasetManifest, hash_bytes, hash_file
 
 if TYPE_CHECKING:
     import pandas
@@ -72,9 +72,7 @@ class Collection(ShortForm, Sequence[Dataset]):
         mask = list(number)
         if len(mask) != len(self) or not {*mask} <= {False, True}:
             raise InputError(f"collection: expected a number, a slice or {len(self)} values True or False")
-        return replace(
-            self, rows=tuple(row for row, is_wanted in zip(self.rows, mask, strict=True) if is_wanted)
-        )
+        return replace(self, rows=tuple(compress(self.rows, mask)))
 
     def table(self) -> "pandas.DataFrame":
         """A row for each dataset: its folder, scene, split, photons, and the fields that differ."""

@@ -28,8 +28,17 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, new_folder_safely, times
-from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
-from pcii.store.manifests import MANIFEST, DatasetManifest, read_manifest
+from pcii.store.folders import (
+    MANIFEST,
+    DatasetManifest,
+    Files,
+    check_free,
+    check_size,
+    lists_part,
+    read_listed,
+    read_manifest,
+    read_part,
+)
 from pcii.store.stored_arrays import (
     ARRAYS,
     COUNTS_LABELS,
@@ -61,11 +70,7 @@ SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
 
 
 def radiance_name(k: int, l: int) -> str:
-    """Path of the radiance of a view in the dataset.
-
-    >>> radiance_name(0, 12)
-    'radiance/view_00_12.exr'
-    """
+    """Path of the radiance of a view in the dataset."""
     return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
 
 

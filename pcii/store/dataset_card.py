@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pcii.base import in_markdown, locked, temporaries_of, visible, web_address, write_bytes_safely
 from pcii.store.collection import is_collection, read_index
-from pcii.store.manifests import COLLECTION, COLLECTION_FOLDER, MANIFEST, read_manifest
+from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, read_manifest
 
 CARD, LICENCE = "README.md", "LICENSE"
 PROJECT = "photon-integral-imaging"

@@ -18,8 +18,7 @@ from pcii.store.dataset import (
     open_dataset,
     radiance_name,
 )
-from pcii.store.folders import check_free, hash_json, list_files
-from pcii.store.manifests import DATASET_FOLDER, DatasetManifest, validated
+from pcii.store.folders import DATASET_FOLDER, DatasetManifest, check_free, hash_json, list_files, validated
 from pcii.store.provenance import PACKAGE, versions
 from pcii.store.stored_arrays import (
     COUNTS_LABELS,

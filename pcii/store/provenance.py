@@ -12,8 +12,7 @@ from pathlib import Path
 from pcii.base import InputError, Report, Stages, answer_json, say, silent
 from pcii.store.collection import CERTIFICATE, CROISSANT, INDEX, check_manifest, is_collection, read_index
 from pcii.store.dataset_card import CARD, LICENCE
-from pcii.store.folders import Files, entries, hash_file, read_listed, unlisted_files
-from pcii.store.manifests import (
+from pcii.store.folders import (
     COLLECTION,
     COLLECTION_FOLDER,
     DATASET_FOLDER,
@@ -21,7 +20,12 @@ from pcii.store.manifests import (
     LOCK,
     RESULTS,
     RESULTS_FOLDER,
+    Files,
+    entries,
+    hash_file,
+    read_listed,
     read_manifest,
+    unlisted_files,
 )
 
 PACKAGE = "photon-integral-imaging"

@@ -5,7 +5,7 @@ from .arrays import (
     check_z_mm as check_z_mm,
 )
 from .arrays import is_whole as is_whole, read_only as read_only, whole_counts as whole_counts
-from .camera_grid import CameraGrid as CameraGrid
+from .cameras import CameraGrid as CameraGrid
 from .estimates import DepthMap as DepthMap, DepthPosterior as DepthPosterior, Score as Score
 from .estimates import Segmented as Segmented
 from .focal_planes import FocalPlanes as FocalPlanes, Sections as Sections, Shifts as Shifts
@@ -20,9 +20,9 @@ from .images import Light as Light, Scope as Scope, Views as Views, binary_scale
 from .images import limit_photons as limit_photons, photon_rates as photon_rates
 from .images import scope_energies as scope_energies, sense as sense
 from .photon_counts import FrameEvents as FrameEvents, PhotonCounts as PhotonCounts
-from .sensor import COLOURS as COLOURS, MOST_BITS as MOST_BITS, MOST_FRAMES as MOST_FRAMES
-from .sensor import NEGLIGIBLE_LOSS as NEGLIGIBLE_LOSS, PATTERNS as PATTERNS, PLAIN as PLAIN
-from .sensor import Readout as Readout, channel_count as channel_count, check_cfa as check_cfa
-from .sensor import clipped_mean as clipped_mean, colour_cells as colour_cells, colour_index as colour_index
-from .sensor import colours_and_samples as colours_and_samples, mosaic as mosaic
+from .cameras import COLOURS as COLOURS, MOST_BITS as MOST_BITS, MOST_FRAMES as MOST_FRAMES
+from .cameras import NEGLIGIBLE_LOSS as NEGLIGIBLE_LOSS, PATTERNS as PATTERNS, PLAIN as PLAIN
+from .cameras import Readout as Readout, channel_count as channel_count, check_cfa as check_cfa
+from .cameras import clipped_mean as clipped_mean, colour_cells as colour_cells, colour_index as colour_index
+from .cameras import colours_and_samples as colours_and_samples, mosaic as mosaic
 from .truth import OPTIONAL_MAPS as OPTIONAL_MAPS, PhotonTruth as PhotonTruth, Truth as Truth

@@ -16,10 +16,9 @@ import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, times
 from pcii.types.arrays import Plottable, check_z_mm, freeze_array, read_only
-from pcii.types.camera_grid import CameraGrid
+from pcii.types.cameras import PLAIN, CameraGrid, Readout, check_cfa, colours_and_samples
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts, PhotonEvents
-from pcii.types.sensor import PLAIN, Readout, check_cfa, colours_and_samples
 from pcii.types.truth import PhotonTruth
 
 Shifts = Literal["nearest", "even"]

@@ -11,9 +11,8 @@ import numpy as np
 
 from pcii.base import LUMINANCE, InputError, times
 from pcii.types.arrays import Plottable, is_whole, read_only
-from pcii.types.camera_grid import CameraGrid
+from pcii.types.cameras import CameraGrid, channel_count, check_cfa, colour_index, colours_and_samples, mosaic
 from pcii.types.photon_counts import PhotonCounts
-from pcii.types.sensor import channel_count, check_cfa, colour_index, colours_and_samples, mosaic
 
 MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""
