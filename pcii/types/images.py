@@ -222,4 +222,5 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
         counts = rng.poisson(rates)
         i, j = np.nonzero(counts)
         columns.append(np.stack([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]]))
-    return PhotonCounts.from_events(*np.concatenate(columns, axis=1), grid, cfa=pattern)
+    k, l, i, j, n = np.concatenate(columns, axis=1)
+    return PhotonCounts.from_events(k, l, i, j, n, grid, cfa=pattern)
