@@ -20,7 +20,7 @@ from pcii.evaluation import NamedMethod, find_datasets, tasks_of
 from pcii.evaluation.tables import light_name
 from pcii.figures import table_markdown, text_table
 from pcii.removal import masks_of
-from pcii.store import depth_range_of, planes_of
+from pcii.sections import depth_range_of, planes_of
 from pcii.types import Light
 
 PARTS = "model", "prior", "shown", "sheets", "search"

@@ -1,8 +1,8 @@
 __version__: str
 __all__: list[str]
 
-from .base.errors import InputError as InputError
-from .base.srgb import srgb_to_linear as srgb_to_linear
+from .base.pixel_arithmetic import srgb_to_linear as srgb_to_linear
+from .base.plain_text import InputError as InputError
 from .depth.methods import depth_methods as depth_methods, depth_posterior as depth_posterior
 from .depth.methods import estimate_depth as estimate_depth
 from .evaluation.comparison import evaluate as evaluate
@@ -25,13 +25,11 @@ from .sections.reconstruction import reconstruct as reconstruct
 from .store.collection import Collection as Collection, open_collection as open_collection
 from .store.dataset import Dataset as Dataset, open_dataset as open_dataset, sample as sample
 from .store.dataset_writer import save_dataset as save_dataset
-from .store.verification import verify as verify
-from .types.camera_grid import CameraGrid as CameraGrid
+from .store.provenance import verify as verify
+from .types.cameras import CameraGrid as CameraGrid
 from .types.estimates import DepthMap as DepthMap, DepthPosterior as DepthPosterior, Score as Score
 from .types.estimates import Segmented as Segmented
-from .types.focal_planes import FocalPlanes as FocalPlanes
-from .types.images import Views as Views
+from .types.focal_planes import FocalPlanes as FocalPlanes, Sections as Sections
+from .types.images import Light as Light, Views as Views, limit_photons as limit_photons
 from .types.photon_counts import PhotonCounts as PhotonCounts
-from .types.photon_limit import Light as Light, limit_photons as limit_photons
-from .types.section_stack import Sections as Sections
 from .types.truth import Truth as Truth

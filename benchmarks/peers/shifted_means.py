@@ -33,7 +33,7 @@ def by_slices(images: np.ndarray, grid: CameraGrid, z_mm: float) -> np.ndarray:
     """Mean of views shifted by whole pixels, as slices."""
     H, W = images.shape[2:4]
     mean = np.zeros((H, W), dtype=np.float32)
-    rows, cols = (shifts[0] for shifts in FocalPlanes.at_depths(grid, z_mm).whole_shifts_px)
+    rows, cols = (shifts[0] for shifts in FocalPlanes.at_depths(grid, z_mm).nearest_shifts_px())
     for k, l in np.ndindex(grid.rows, grid.cols):
         r, c = int(rows[k]), int(cols[l])
         target = mean[max(r, 0) : H + min(r, 0), max(c, 0) : W + min(c, 0)]

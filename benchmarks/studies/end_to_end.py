@@ -33,8 +33,8 @@ ANALYSIS = """
 import json, sys
 from pathlib import Path
 from pcii.app.results import run
-from pcii.store.dataset import open_dataset
-from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.sections import depth_range_of, planes_of
+from pcii.store import open_dataset
 dataset = open_dataset(Path(sys.argv[1]))
 outcome = run(dataset, Path(sys.argv[2]), planes_of(dataset, None), depth_range_of(dataset))
 print(json.dumps(outcome.timings_s))

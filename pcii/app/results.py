@@ -36,8 +36,11 @@ from pcii.depth import DEFAULT_METHOD
 from pcii.evaluation import identity_of
 from pcii.sections import reconstruct
 from pcii.store import (
+    DEPTH_LABELS,
     RESULTS,
     RESULTS_FOLDER,
+    SECTIONS_LABELS,
+    SEGMENTED_LABELS,
     Dataset,
     Files,
     entries,
@@ -46,19 +49,10 @@ from pcii.store import (
     own_software,
     read_array,
     read_part,
-    read_results,
     unlisted_files,
     write_arrays_safely,
 )
-from pcii.types import (
-    DEPTH_LABELS,
-    SECTIONS_LABELS,
-    SEGMENTED_LABELS,
-    DepthMap,
-    FocalPlanes,
-    Sections,
-    Segmented,
-)
+from pcii.types import DepthMap, FocalPlanes, Sections, Segmented
 
 SECTIONS, DEPTH, SCORE, REPORT = "sections.zarr", "depth.zarr", "score.json", "report.html"
 
@@ -140,7 +134,7 @@ def _results_of(out: Path, dataset: Dataset) -> tuple[Files, Mapping[str, str]]:
         return {}, {}
     if not (out / RESULTS).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
-    results, origin = read_results(out), _origin(dataset)
+    results, origin = RESULTS_FOLDER.read(out), _origin(dataset)
     if (results.identity, results.light) != (origin["identity"], origin["light"]):
         raise InputError(f"{out}: holds the results of another dataset or light; name a new or empty folder")
     return results.files, results.versions

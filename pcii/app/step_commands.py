@@ -20,17 +20,9 @@ from pcii.depth import DEFAULT_METHOD, estimate_depth
 from pcii.figures import draw_depth, exposed, figure_bytes, mask_image, new_figure, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
+from pcii.sections import depth_range_of, has_depths, planes_of
 from pcii.sections import reconstruct as reconstruct_sections
-from pcii.store import (
-    Dataset,
-    depth_range_of,
-    differences,
-    has_depths,
-    open_dataset,
-    own_software,
-    planes_of,
-    read_results,
-)
+from pcii.store import RESULTS_FOLDER, Dataset, differences, open_dataset, own_software
 from pcii.types import DepthMap, FocalPlanes, Light, Segmented
 
 DEPTH_IN = 9.0
@@ -206,7 +198,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
-    data, manifest = open_dataset(dataset), read_results(out)
+    data, manifest = open_dataset(dataset), RESULTS_FOLDER.read(out)
     data = data if manifest.light is None else data.at_light(Light.parse(manifest.light))
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):

@@ -1,4 +1,4 @@
-"""Command lines: help, what commands print, error messages of one sentence, and exit codes.
+"""Command lines: help, what commands print, progress, error messages of one sentence, and exit codes.
 
 Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted, 141 standard output closed by its reader.
 With PCII_TRACEBACK=1 in the environment tracebacks are shown.
@@ -9,18 +9,25 @@ import os
 import shlex
 import signal
 import sys
+import threading
+import time
 import warnings
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError, WorkerLostError
-from pcii.base.plain_text import in_terminal
+from pcii.base.plain_text import InputError, WorkerLostError, visible
 
 if TYPE_CHECKING:
     from cyclopts import App, Token
+    from rich.progress import Progress, TaskID
+
+Report = Callable[[str, int, int], None]
+"""Type of a progress callback: report(stage, done, total)."""
+LOG_EVERY_S = 10.0
 
 
 # What commands print
@@ -28,7 +35,7 @@ if TYPE_CHECKING:
 
 def say(text: str) -> None:
     """Print a line of what a command was asked for, or of what it did, on standard output."""
-    print(in_terminal(text), flush=True)
+    _print(text, sys.stdout)
 
 
 def answer_json(value: Any) -> None:
@@ -39,7 +46,12 @@ def answer_json(value: Any) -> None:
 
 def complain(text: str) -> None:
     """Print a line of what went wrong on standard error."""
-    print(in_terminal(text), file=sys.stderr, flush=True)
+    _print(text, sys.stderr)
+
+
+def _print(text: str, stream: IO[str]) -> None:
+    """Print the lines of a text, with what a terminal would obey and not show as escape sequences."""
+    print("\n".join(map(visible, text.split("\n"))), file=stream, flush=True)
 
 
 def complain_of(faults: Sequence[str], prefix: str = "") -> None:
@@ -64,6 +76,71 @@ def say_next_page(path: Path) -> None:
 def results_folder(folder: Path) -> Path:
     """Folder that is suggested for the results of a dataset or collection."""
     return folder.parent / f"{folder.name}-results"
+
+
+# Progress: bars on a terminal, plain lines in a log
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Report nothing: the default where progress is optional."""
+
+
+class Stages(AbstractContextManager["Stages"]):
+    """Progress of named stages: bars on a terminal, else a line every ten seconds, with the time left.
+
+    Call it as stages(name, done, total); a stage ends when done reaches total, and begins anew when less is
+    done than before.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()  # steps of one analysis report from two threads
+        self._bars: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._begun: dict[str, float] = {}
+        self._done: dict[str, int] = {}
+        self._logged: dict[str, float] = {}
+
+    def __enter__(self) -> "Stages":
+        if sys.stderr.isatty():
+            from rich import progress as rich
+            from rich.console import Console
+
+            self._bars = rich.Progress(
+                rich.TextColumn("{task.description}", markup=False),
+                rich.BarColumn(),
+                rich.MofNCompleteColumn(),
+                rich.TimeElapsedColumn(),
+                rich.TextColumn("left"),
+                rich.TimeRemainingColumn(),
+                console=Console(stderr=True),
+            )
+            self._bars.start()
+        return self
+
+    def __exit__(self, *fault: object) -> None:
+        if self._bars is not None:
+            self._bars.stop()
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        with self._lock:
+            self._show(visible(stage), done, total)
+
+    def _show(self, stage: str, done: int, total: int) -> None:
+        is_anew, self._done[stage] = done < self._done.get(stage, 0), done
+        if self._bars is not None:
+            if stage not in self._tasks:
+                self._tasks[stage] = self._bars.add_task(stage, total=total)
+            if is_anew:
+                self._bars.reset(self._tasks[stage])
+            self._bars.update(self._tasks[stage], completed=done, total=total)
+            return
+        now = time.monotonic()
+        begun = self._begun[stage] = now if is_anew else self._begun.get(stage, now)
+        if done == total or now - max(begun, self._logged.get(stage, begun)) >= LOG_EVERY_S:
+            self._logged[stage] = now
+            left_s = (total - done) * (now - begun) / max(done, 1)
+            left = f", {left_s:.0f} s left" if 0 < done < total else ""
+            print(f"{stage}: {done}/{total}, {now - begun:.1f} s{left}", file=sys.stderr, flush=True)
 
 
 # Commands

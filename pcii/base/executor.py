@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError, WorkerLostError
+from pcii.base.plain_text import InputError, WorkerLostError
 
 if TYPE_CHECKING:
     from concurrent.futures import Future

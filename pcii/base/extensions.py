@@ -9,7 +9,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.errors import InputError
+from pcii.base.plain_text import InputError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from pcii.base.errors import InputError
+from pcii.base.plain_text import InputError
 
 
 def write_bytes_safely(path: Path, content: bytes) -> None:
@@ -48,42 +48,38 @@ def write_json_safely(path: Path, value: Any) -> None:
 def new_folder_safely(folder: Path) -> Iterator[Path]:
     """An empty folder to fill, which replaces `folder` when the block ends without an exception.
 
-    Where `folder` is a symbolic link, what it leads to is replaced.
+    Where `folder` is a symbolic link, what it leads to is replaced. All is flushed to disk first; a former
+    folder is renamed, and deleted last.
     """
     folder = folder.resolve() if folder.is_symlink() else folder
-    with temporary_folder(folder) as temporary:
-        yield temporary
-        replace_folder(temporary, folder)
+    with _temporary_folder(folder) as new:
+        yield new
+        new.chmod(0o755)
+        for file in new.rglob("*"):
+            if file.is_file():
+                with named_in_errors(folder), file.open("rb") as opened:
+                    os.fsync(opened.fileno())
+        with _temporary_folder(folder) as old:
+            replaces = folder.exists()
+            if replaces:
+                folder.replace(old)  # allowed since `old` is empty
+            try:
+                new.replace(folder)
+            except OSError:
+                if replaces:
+                    old.replace(folder)
+                raise
+            _sync_folder(folder.parent)
 
 
 @contextmanager
-def temporary_folder(folder: Path) -> Iterator[Path]:
+def _temporary_folder(folder: Path) -> Iterator[Path]:
     """An empty folder beside `folder`, removed at the end of the block unless it was renamed by then."""
     temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".tmp"))
     try:
         yield temporary
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-
-
-def replace_folder(new: Path, folder: Path) -> None:
-    """Flush `new` to disk and rename it to `folder`; a former folder is renamed first and deleted last."""
-    new.chmod(0o755)
-    for file in new.rglob("*"):
-        if file.is_file():
-            with named_in_errors(folder), file.open("rb") as opened:
-                os.fsync(opened.fileno())
-    with temporary_folder(folder) as old:
-        replaces = folder.exists()
-        if replaces:
-            folder.replace(old)  # allowed since `old` is empty
-        try:
-            new.replace(folder)
-        except OSError:
-            if replaces:
-                old.replace(folder)
-            raise
-        _sync_folder(folder.parent)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -9,7 +9,7 @@ Another package registers one as an entry point of the group `pcii.depth_methods
 of their height and width, with depths above 0 or NaN, and confidence from 0 to 1.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from pcii.types import (
     PhotonCounts,
     Views,
     check_data,
-    check_z_mm,
+    check_depth_range,
     depth_of_total_disparity_mm,
     disparity_px,
     total_disparity_px,
@@ -153,11 +153,7 @@ def depth_posterior(
 
 def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
     """Near and far end of a range of depths; raises `InputError` if it cannot be searched."""
-    if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
-        raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
-    near, far = check_z_mm(z_range_mm).tolist()
-    if near >= far:
-        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    near, far = check_depth_range(z_range_mm)
     check_search(grid, "z_range_mm", np.array([near, far]))
     return near, far
 

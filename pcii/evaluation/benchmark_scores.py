@@ -23,17 +23,16 @@ from pcii.evaluation.submissions import (
     read_submission,
     tasks_of_submission,
 )
-from pcii.sections import reconstruct
+from pcii.sections import planes_of, reconstruct
 from pcii.store import (
     BENCHMARK_FIELDS,
+    COLLECTION_FOLDER,
     INDEX,
     Collection,
     Dataset,
     Half,
     is_collection,
     open_collection,
-    planes_of,
-    read_collection,
     validated,
 )
 from pcii.types import FULL_LIGHT, DepthMap, Light, Segmented
@@ -58,9 +57,9 @@ class BenchmarkHalf:
 
 def open_benchmark(path: Path, half: Half) -> BenchmarkHalf:
     """Open one half of a benchmark; `InputError` for another folder, and for a damaged dataset."""
-    if not is_collection(path) or read_collection(path).fields != [*BENCHMARK_FIELDS]:
+    if not is_collection(path) or COLLECTION_FOLDER.read(path).fields != [*BENCHMARK_FIELDS]:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
-    recipe = read_collection(path).recipe
+    recipe = COLLECTION_FOLDER.read(path).recipe
     advice = f"the same `simgen benchmark make -o {path}` goes on with it"
     if not (path / INDEX).is_file():
         raise InputError(f"{path}: the benchmark is unfinished; {advice}")

@@ -93,7 +93,7 @@ def evaluate(
     those that recipes name. `executor` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
-    unless other software made them (see `pcii.store.software`). evaluation.html, means.csv and
+    unless other software made them (see `pcii.store.provenance`). evaluation.html, means.csv and
     evaluation.json summarise the last row of each. The seconds of a row are the wall time of the method
     alone, after a warm-up call at the first dataset of each light; where several processes work at a time,
     each is slower. Raises `InputError` for a dataset without truth, depths, or counts and

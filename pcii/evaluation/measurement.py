@@ -17,8 +17,8 @@ from pcii.evaluation.method_names import NamedMethod, estimator_of, methods_for,
 from pcii.evaluation.rows import Key, Row, RowFile, leaves
 from pcii.metrics import object_bounds, score
 from pcii.removal import segment
-from pcii.sections import reconstruct
-from pcii.store import TRUTH, Dataset, depth_range_of, differences, has_depths, hash_json, machine, planes_of
+from pcii.sections import depth_range_of, has_depths, planes_of, reconstruct
+from pcii.store import TRUTH, Dataset, differences, hash_json, machine
 from pcii.types import FULL_LIGHT, DepthMap, Light, PhotonCounts, Sections, Segmented, Views
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pcii.base import InputError, is_plain_name, load_function, name_of
+from pcii.base import InputError, is_plain, load_function, name_of
 from pcii.depth import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.depth import methods as depth
 from pcii.removal import methods as removal
@@ -141,14 +141,14 @@ def named_method(method: Method) -> NamedMethod:
 def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
     """Raise `InputError`, which begins with `label`, for a full name that could be taken for another one.
 
-    It is a name by `is_plain_name`, has no colon but that of `depth:`, and no bracket. It differs from those
-    of known methods by more than case, or else, if it `may_be_known`, is one of them.
+    All of it is seen (`is_plain`), it has no colon but that of `depth:`, and no bracket. It differs from
+    those of known methods by more than case, or else, if it `may_be_known`, is one of them.
     """
     short_name = name.removeprefix(_PREFIX)
-    if not is_plain_name(short_name) or not short_name or _NOT_IN_NAMES & {*short_name}:
+    if not is_plain(short_name) or not short_name or _NOT_IN_NAMES & {*short_name}:
         raise InputError(
-            f"{label}: expected a name of letters (of one alphabet in each word), digits, single blanks and "
-            f"ASCII punctuation other than colons and brackets, in Unicode's form NFKC, got {short_name!a}"
+            f"{label}: expected a name of characters that are seen and single blanks, without colons and "
+            f"brackets, in Unicode's form NFKC, got {short_name!a}"
         )
     known = known_methods()
     if may_be_known and name in known:

@@ -29,7 +29,8 @@ from pydantic import (
 from pcii.base import InputError, is_plain, web_address
 from pcii.evaluation.measurement import Task
 from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of
-from pcii.store import Dataset, Half, first_fault, planes_of
+from pcii.sections import planes_of
+from pcii.store import Dataset, Half, first_fault
 from pcii.types import FULL_LIGHT, DepthMap
 
 SUBMISSION = "submission.json"

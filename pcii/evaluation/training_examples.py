@@ -17,8 +17,8 @@ import numpy as np
 from pcii.base import InputError
 from pcii.evidence import evidence_of_texture
 from pcii.metrics import TrueFocus
-from pcii.sections import reconstruct
-from pcii.store import Collection, Dataset, Split, depth_range_of, open_collection
+from pcii.sections import depth_range_of, reconstruct
+from pcii.store import Collection, Dataset, Split, open_collection
 from pcii.types import COLOURS, CameraGrid, FocalPlanes, PhotonCounts, Truth, colour_index, total_disparity_px
 
 Field = Literal["counts", "sections", "evidence", "truth"]

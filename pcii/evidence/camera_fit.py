@@ -16,11 +16,11 @@ import numpy as np
 
 from pcii.base import block_sums, evenly_chosen
 from pcii.exchange import AS_STORED, ViewOrder
-from pcii.store import check_depth_range
 from pcii.types import (
     CameraGrid,
     PhotonCounts,
     Views,
+    check_depth_range,
     depth_of_total_disparity_mm,
     parallax_per_total,
     total_disparity_px,

@@ -148,7 +148,7 @@ def _block_sums(
 
 def _samples_of_blocks(plane: FocalPlanes, axis: int, block_px: int) -> np.ndarray:
     """Pixels of all camera rows, or columns, in each row or column of blocks: float32, as many as blocks."""
-    size, shift = plane.grid.shape_HW[axis], plane.whole_shifts_px[axis][0]
+    size, shift = plane.grid.shape_HW[axis], plane.nearest_shifts_px()[axis][0]
     edges = np.minimum(block_px * np.arange(-(-size // block_px) + 1), size)
     # The pixels of a shifted row before each edge.
     before = np.clip(edges - np.maximum(shift, 0)[:, None], 0, np.maximum(size - np.abs(shift), 0)[:, None])

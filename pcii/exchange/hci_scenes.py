@@ -26,7 +26,7 @@ from pcii.exchange.export_pictures import pictures_of, write_png
 from pcii.exchange.image_folders import KnownViews, import_images, listed_names
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
 from pcii.exchange.stated_cameras import Note, Optics, warn
-from pcii.store import Dataset, read_small
+from pcii.store import Dataset
 from pcii.types import Truth
 
 PARAMETERS = "parameters.cfg"
@@ -34,7 +34,6 @@ PATTERN = "input_Cam{index:03d}.png"
 VIEW = re.compile(r"input_cam.*\.png", re.IGNORECASE)
 DEPTH, DISPARITY = "gt_depth_lowres.pfm", "gt_disp_lowres.pfm"
 README = "README.txt"
-LARGEST_PARAMETERS_BYTES = 1 << 16
 INFINITY_M = 1e9
 """Focus distance of a grid without shear. The benchmark's own tools divide by the focus distance and multiply
 with it: infinity or 0 would make NaN of all disparities; this changes none by more than 1e-8 of itself."""
@@ -132,12 +131,13 @@ class _Parameters:
     """The numbers of a parameters.cfg; `texts` are those by name that were not read."""
 
     def __init__(self, path: Path) -> None:
-        content = read_small(path, LARGEST_PARAMETERS_BYTES, "the benchmark's folders have it")
+        if not path.is_file():
+            raise InputError(f"{path}: missing; the benchmark's folders have it")
         parser = configparser.ConfigParser(
             interpolation=None, strict=False, inline_comment_prefixes=("#", ";")
         )
         try:
-            parser.read_string(content.decode("utf-8-sig", "replace"))
+            parser.read_string(path.read_bytes().decode("utf-8-sig", "replace"))
         except configparser.Error as fault:
             sentence = visible(" ".join(str(fault).split()))
             raise InputError(f"{path}: not a file of parameters ({sentence})") from None

@@ -21,7 +21,6 @@ from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
 from pcii.exchange.image_folders import VIEWS
 from pcii.exchange.pixel_files import picture_of
 from pcii.exchange.stated_cameras import Note, warn
-from pcii.store import LARGEST_DOCUMENT_BYTES, read_small
 
 MOST_PX = 0.1
 """What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""
@@ -168,9 +167,8 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
 
 def _parsed(file: Path) -> _Document:
     """The document of a file; `InputError` with the first member that is wrong."""
-    content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
     try:
-        return _Document.model_validate(json.loads(content))
+        return _Document.model_validate(json.loads(file.read_bytes()))
     except ValidationError as fault:
         first = fault.errors()[0]
         place = ".".join(str(step) for step in first["loc"])

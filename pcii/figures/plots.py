@@ -7,11 +7,12 @@ panel.
 
 import math
 from collections.abc import Callable, Sequence
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.base import InputError, evenly_chosen, in_html
+from pcii.base import InputError, evenly_chosen, visible
 from pcii.figures.panels import (
     COLOURS,
     GRID_COLOUR,
@@ -79,7 +80,7 @@ def picture_html(value: Any) -> str:
     """The line of a value and its drawing, in HTML; without a picture if its data cannot be read."""
     from matplotlib import pyplot
 
-    line = f"<pre>{in_html(repr(value))}</pre>"
+    line = f"<pre>{escape(visible(repr(value)))}</pre>"
     try:
         figure = draw(value)[0].figure
     except (InputError, OSError):

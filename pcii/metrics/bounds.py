@@ -35,7 +35,7 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     texture of which all views together have N = `photons`; `gradient_squared` is (<g_x^2>, <g_y^2>), means
     over the photons. None without information on depth: no photons, no texture or a single camera.
 
-    >>> from pcii.types.camera_grid import CameraGrid
+    >>> from pcii.types import CameraGrid
     >>> grid = CameraGrid(
     ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=9, width=9
     ... )

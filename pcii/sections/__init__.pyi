@@ -7,5 +7,6 @@ from .photon_statistics import pooled_samples as pooled_samples, region_entropy_
 from .photon_statistics import section_window_px as section_window_px
 from .photon_statistics import truncated_poisson_variance as truncated_poisson_variance
 from .photon_statistics import view_samples as view_samples, warn_of_saturation as warn_of_saturation
-from .reconstruction import PROBE_STEPS_PX as PROBE_STEPS_PX, extend as extend, reconstruct as reconstruct
-from .reconstruction import with_probes as with_probes
+from .reconstruction import PROBE_STEPS_PX as PROBE_STEPS_PX, depth_range_of as depth_range_of
+from .reconstruction import extend as extend, has_depths as has_depths, planes_of as planes_of
+from .reconstruction import reconstruct as reconstruct, with_probes as with_probes

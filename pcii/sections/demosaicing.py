@@ -21,7 +21,7 @@ def demosaic(mosaic_HW: np.ndarray, *, cfa: str | None = "GRBG", method: str = M
     Bayer phase. Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity,
     and values so large that those of neighbours cannot be added up.
 
-    >>> from pcii.types.bayer import mosaic
+    >>> from pcii.types import mosaic
     >>> image = demosaic(mosaic(np.full((4, 6, 3), [1.0, 2.0, 3.0]), "GRBG"), cfa="GRBG")
     >>> image.shape, image[1, 2].tolist()
     ((4, 6, 3), [1.0, 2.0, 3.0])

@@ -6,12 +6,14 @@ raw Bayer colours never mix. Photon counts stay integers until that last divisio
 interpolated.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from pcii.base import InputError
 from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
+from pcii.store import Dataset
 from pcii.types import (
     LARGEST_COUNT,
     PLAIN,
@@ -22,6 +24,7 @@ from pcii.types import (
     Views,
     check_data,
     colour_cells,
+    disparity_px,
     is_whole,
 )
 
@@ -211,3 +214,35 @@ def _samples_at(targets: np.ndarray, size: int) -> np.ndarray:
     """How many targets fall on each of the voxel rows 0 .. size-1."""
     inside = targets[(targets >= 0) & (targets < size)]
     return np.bincount(inside, minlength=size)
+
+
+def has_depths(dataset: Dataset, z_mm: Sequence[float] | None = None) -> bool:
+    """Whether depths are given, or suggested by the recipe of the dataset."""
+    return bool(z_mm or dataset.analysis.get("z_mm"))
+
+
+def planes_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> FocalPlanes:
+    """Focal planes at the depths `z_mm`, else at those that the recipe suggests.
+
+    Raises `InputError` if there are none, or if no neighbouring views overlap at one: nothing is in focus.
+    """
+    if not has_depths(dataset, z_mm):
+        advice = "name depths with --z-mm, or a range with --z-range-mm"
+        raise InputError(f"{dataset.path}: suggests no depths; {advice}")
+    grid = dataset.grid
+    planes = FocalPlanes.at_depths(grid, z_mm or dataset.analysis["z_mm"])
+    across, down = (np.abs(px) for px in disparity_px(grid, planes.z_mm))
+    overlap = ((across < grid.width) & (grid.cols > 1)) | ((down < grid.height) & (grid.rows > 1))
+    if grid.view_count > 1 and not overlap.all():
+        z = planes.z_mm[~overlap][0]
+        raise InputError(f"z_mm: {z:g} mm is so near that no views overlap; depths are in mm")
+    return planes
+
+
+def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
+    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of those of `planes_of`."""
+    suggested = dataset.analysis.get("z_range_mm")
+    if suggested:
+        return float(suggested[0]), float(suggested[1])
+    z = planes_of(dataset, z_mm).z_mm
+    return 0.8 * float(z.min()), 1.25 * float(z.max())

@@ -12,28 +12,24 @@ all the manifests, and the hash of each.
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from pcii.base import InputError, ShortForm, listed, write_bytes_safely
 from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.dataset_layout import MANIFEST
-from pcii.store.folders import FolderKind, hash_bytes, hash_file
+from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, DatasetManifest, hash_bytes, hash_file
 
 if TYPE_CHECKING:
     import pandas
 
-    from pcii.store.manifests import CollectionManifest, DatasetManifest
-
 COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 """Columns of the table beside the swept fields."""
-COLLECTION = "collection.json"
 INDEX = "index.jsonl"
 CROISSANT = "croissant.json"
 """In the folder of a benchmark: what catalogues of datasets read."""
 CERTIFICATE = "certificate.json"
 """In the folder of a benchmark: how its datasets compare with the published ones."""
-COLLECTION_FOLDER = FolderKind("collection", COLLECTION, 1, "simgen generate", frozenset({COLLECTION}))
 REMEDY = "the same `simgen generate` command makes it again from the datasets"
 Split = Literal["train", "validation", "test"]
 Half = Literal["development", "test"]
@@ -76,9 +72,7 @@ class Collection(ShortForm, Sequence[Dataset]):
         mask = list(number)
         if len(mask) != len(self) or not {*mask} <= {False, True}:
             raise InputError(f"collection: expected a number, a slice or {len(self)} values True or False")
-        return replace(
-            self, rows=tuple(row for row, is_wanted in zip(self.rows, mask, strict=True) if is_wanted)
-        )
+        return replace(self, rows=tuple(compress(self.rows, mask)))
 
     def table(self) -> "pandas.DataFrame":
         """A row for each dataset: its folder, scene, split, photons, and the fields that differ."""
@@ -94,8 +88,8 @@ def open_collection(path: str | Path) -> Collection:
     Reads the index only. Raises `InputError` for a folder that is no collection, or whose index was changed.
     """
     root = Path(path)
-    document, rows = read_collection(root), read_index(root)
-    return Collection(root, tuple(document.fields), tuple(rows))
+    fields, rows = COLLECTION_FOLDER.read(root).fields, read_index(root)
+    return Collection(root, tuple(fields), tuple(rows))
 
 
 def split_of(scene_number: int) -> Split:
@@ -111,7 +105,7 @@ def split_of(scene_number: int) -> Split:
 
 
 def index_row(
-    name: str, values: Mapping[str, Any], manifest: "DatasetManifest", manifest_file: Path
+    name: str, values: Mapping[str, Any], manifest: DatasetManifest, manifest_file: Path
 ) -> dict[str, Any]:
     """The index's line about a finished dataset, in the folder `name`, of these values of swept fields."""
     recipe, photons = manifest.recipe, manifest.photons
@@ -127,13 +121,6 @@ def index_row(
         "identity": manifest.identity,
         "manifest_sha256": hash_file(manifest_file),
     }
-
-
-def read_collection(root: Path) -> "CollectionManifest":
-    """What the datasets of a collection have in common; `InputError` if that is missing or damaged."""
-    from pcii.store.manifests import CollectionManifest
-
-    return COLLECTION_FOLDER.read(root, CollectionManifest)
 
 
 def write_index(root: Path, rows: Iterable[Mapping[str, Any]]) -> None:

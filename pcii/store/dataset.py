@@ -1,40 +1,58 @@
-"""Datasets: counts, truth and radiance of a dataset folder, each checked when it is read."""
+"""Datasets: counts, truth and radiance of a dataset folder, each checked when it is read.
 
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
+    counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts.zarr/frame        (photon,) the frame of each count, on request
+    counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
+    photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
+    truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
+    radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
+    arrays.zip               in place of the .zarr folders, where many small files would be a burden
+
+The archive is a ZIP file as the zip stores of Zarr are: without compression, since chunks are compressed
+already. Its members are in order and without dates, so that the same arrays make the same bytes.
+
+A dataset without a manifest is unfinished, a file whose hash differs is damaged, and what is not listed is
+not read.
+"""
+
+import io
 import shutil
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, new_folder_safely, times
-from pcii.store.dataset_layout import (
-    ARRAYS,
-    COUNTS,
-    FRAME,
+from pcii.store.folders import (
     MANIFEST,
-    PHOTON_TRUTH,
-    RADIANCE,
-    TRUTH,
-    nested_name,
-    radiance_name,
-    read_exr,
+    DatasetManifest,
+    Files,
+    check_free,
+    check_size,
+    lists_part,
+    read_listed,
     read_manifest,
-    read_packed,
+    read_part,
 )
-from pcii.store.folders import Files, check_free, check_size, lists_part, read_listed, read_part
-from pcii.store.zarr_groups import read_array
-from pcii.types import (
+from pcii.store.stored_arrays import (
+    ARRAYS,
     COUNTS_LABELS,
+    PHOTON_TRUTH_LABELS,
+    TRUTH_LABELS,
+    Label,
+    read_array,
+    read_exr,
+)
+from pcii.types import (
     EXPOSURE,
     FULL_LIGHT,
     OPTIONAL_MAPS,
-    PHOTON_TRUTH_LABELS,
-    TRUTH_LABELS,
     CameraGrid,
-    Label,
     Light,
     PhotonCounts,
     PhotonTruth,
@@ -42,10 +60,30 @@ from pcii.types import (
     Views,
 )
 
-if TYPE_CHECKING:
-    from pcii.store.manifests import DatasetManifest
-
+COUNTS = "counts.zarr"
+FRAME = "frame"
+"""Array of the counts that has the frame of each."""
+TRUTH = "truth.zarr"
+PHOTON_TRUTH = "photon_truth.zarr"
+RADIANCE = "radiance"
 SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
+
+
+def radiance_name(k: int, l: int) -> str:
+    """Path of the radiance of a view in the dataset."""
+    return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
+
+
+def nested_name(part: str, budget: float | None) -> str:
+    """Name of an array group for a nested photon budget; unchanged for None.
+
+    >>> nested_name("counts.zarr", 300.0)
+    'counts-300.zarr'
+    """
+    if budget is None:
+        return part
+    stem, suffix = part.rsplit(".", 1)
+    return f"{stem}-{budget:.12g}.{suffix}"
 
 
 class StoredRadiance:
@@ -62,8 +100,6 @@ class StoredRadiance:
         if index not in np.ndindex(K, L):
             raise InputError(f"radiance: read one of {K} x {L} views by [k, l], or all by numpy.asarray")
         name = radiance_name(*index)
-        if name not in self._files:
-            raise InputError(f"{self._root}: the manifest lists no {name}")
         content = read_listed(self._root, name, self._files[name])
         return read_exr(self._root / name, self.shape[2:], content)
 
@@ -82,7 +118,7 @@ class Dataset(ShortForm):
     """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
 
     path: Path
-    manifest: "DatasetManifest"
+    manifest: DatasetManifest
     choice: Light | None = None
     """The light of a nested budget, or full light; None for all photons or, without any, the radiance."""
 
@@ -172,14 +208,12 @@ class Dataset(ShortForm):
         if self.has(f"{part}/{FRAME}"):
             names += (FRAME,)
         arrays = self._arrays(part, COUNTS_LABELS, names)
-        readout: dict[str, Any] = {"frames": self.manifest.frames, "bits": self.manifest.bits}
+        film: dict[str, Any] = {"grid": self.grid, "cfa": self.cfa}
+        film |= {"frames": self.manifest.frames, "bits": self.manifest.bits}
         try:
             if "dense" in arrays:
-                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **readout)
-            k, l, i, j, n = (arrays[name] for name in "klijn")
-            return PhotonCounts.from_events(
-                k, l, i, j, n, self.grid, cfa=self.cfa, frame=arrays.get(FRAME), **readout
-            )
+                return PhotonCounts.from_dense(arrays["dense"], **film)
+            return PhotonCounts.from_events(**arrays, **film)
         except InputError as fault:
             raise InputError(f"{self.path / part}: {fault}") from None
 
@@ -247,12 +281,9 @@ class Dataset(ShortForm):
     @cached_property
     def _packed(self) -> dict[str, bytes]:
         """Content of all packed files by their paths."""
-        if ARRAYS not in self.manifest.files:
-            raise InputError(
-                f"{self.path / MANIFEST}: files: there is no {ARRAYS}, which is to hold what is packed"
-            )
-        archive = read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS])
-        return read_packed(self.path / ARRAYS, archive, self.manifest.packed)
+        archive = io.BytesIO(read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS]))
+        with zipfile.ZipFile(archive) as members:
+            return {name: members.read(name) for name in self.manifest.packed}
 
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pcii.base import in_markdown, locked, temporaries_of, visible, web_address, write_bytes_safely
-from pcii.store.collection import COLLECTION, is_collection, read_collection, read_index
-from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
-from pcii.store.dataset_layout import LICENCE as LICENCE_FILE
+from pcii.store.collection import is_collection, read_index
+from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, read_manifest
 
+CARD, LICENCE = "README.md", "LICENSE"
 PROJECT = "photon-integral-imaging"
 SOFTWARE = (
     "Photon-starved integral imaging: physically based data, reconstruction and defocus removal "
@@ -77,7 +77,7 @@ def write_card(root: Path, terms: Terms) -> None:
     it is there already, so that a folder that is read-only will do.
     """
     if is_collection(root):
-        collection, rows = read_collection(root), read_index(root)
+        collection, rows = COLLECTION_FOLDER.read(root), read_index(root)
         scenes = list(dict.fromkeys(row["scene"] for row in rows if row["scene"]))
         names = ", ".join(scenes) if len(scenes) <= MOST_NAMED else f"{len(scenes)} scenes"
         title = str(collection.recipe.get("title") or names or "Integral images")
@@ -122,7 +122,7 @@ def write_licence(root: Path, terms: Terms) -> None:
         lines.append(f"By {', '.join(map(visible, terms.creators))}.")
     if terms.reference:
         lines.append(f"Please cite:\n\n{visible(terms.reference)}")
-    _write(root, LICENCE_FILE, "\n\n".join(lines) + "\n", OPENING)
+    _write(root, LICENCE, "\n\n".join(lines) + "\n", OPENING)
 
 
 def _write(root: Path, name: str, text: str, mark: str) -> None:

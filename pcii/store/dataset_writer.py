@@ -8,31 +8,27 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, named_in_errors, new_folder_safely
-from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.dataset_layout import (
+from pcii.store.dataset import (
     COUNTS,
     FRAME,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
+    Dataset,
+    open_dataset,
     radiance_name,
-    write_exr_safely,
-    write_manifest,
 )
-from pcii.store.folders import check_free, hash_json, list_files
-from pcii.store.software import PACKAGE, versions
-from pcii.store.zarr_groups import DTYPES, write_arrays_safely
-from pcii.types import (
+from pcii.store.folders import DATASET_FOLDER, DatasetManifest, check_free, hash_json, list_files, validated
+from pcii.store.provenance import PACKAGE, versions
+from pcii.store.stored_arrays import (
     COUNTS_LABELS,
-    OPTIONAL_MAPS,
+    DTYPES,
     PHOTON_TRUTH_LABELS,
     TRUTH_LABELS,
-    PhotonCounts,
-    PhotonTruth,
-    Truth,
-    Views,
-    check_z_mm,
+    write_arrays_safely,
+    write_exr_safely,
 )
+from pcii.types import OPTIONAL_MAPS, PhotonCounts, PhotonTruth, Truth, Views, check_depth_range, check_z_mm
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
@@ -68,15 +64,13 @@ def save_dataset(
     for parts that do not belong together.
 
     >>> from tempfile import TemporaryDirectory
-    >>> from pcii.types.camera_grid import CameraGrid
+    >>> from pcii.types import CameraGrid
     >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
     >>> counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
     >>> with TemporaryDirectory() as folder:
     ...     save_dataset(Path(folder) / "mine", counts, z_mm=500, title="Two views").counts.total
     48
     """
-    from pcii.store.manifests import DatasetManifest, validated
-
     counts, views = _counts_and_views(images)
     if photon_budget is not None and counts is None:
         raise InputError("photon_budget: is for images that are photon counts")
@@ -86,7 +80,7 @@ def save_dataset(
     maps = _stored_maps(truth, view_z_mm, counts or views)
     analysis: dict[str, Any] = {} if z_mm is None else {"z_mm": check_z_mm(z_mm).tolist()}
     if z_range_mm is not None:
-        analysis["z_range_mm"] = check_depth_range(z_range_mm)
+        analysis["z_range_mm"] = list(check_depth_range(z_range_mm))
     out = Path(path).absolute()
     check_free(out, "dataset")
     with named_in_errors(out):
@@ -104,7 +98,7 @@ def save_dataset(
             manifest |= {"analysis": analysis, "photon_budget": photon_budget and float(photon_budget)}
             manifest |= {"versions": versions(PACKAGE, "numpy", "zarr")}
             validated(DatasetManifest, manifest)
-            write_manifest(new, manifest)
+            DATASET_FOLDER.write(new, manifest)
     return open_dataset(path)
 
 
@@ -124,11 +118,6 @@ def write_counts(folder: Path, counts: PhotonCounts) -> None:
     write_arrays_safely(folder, {**pixels, "n": counts.events.n}, COUNTS_LABELS)
 
 
-def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) -> None:
-    """Write the origins (N,) of all photons, in the order of the events of their counts."""
-    write_arrays_safely(folder, {"object_id": object_id, "z_mm": z_mm}, PHOTON_TRUTH_LABELS)
-
-
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
     """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
     parts = images if isinstance(images, tuple | list) else [images]
@@ -143,14 +132,6 @@ def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None
         if views.radiance.shape[4] == 1 and counts.cfa != views.cfa:
             raise InputError(f"images: expected the same Bayer pattern, got {counts.cfa} and {views.cfa}")
     return counts, views
-
-
-def check_depth_range(z_range_mm: object) -> list[float]:
-    """The nearest and farthest depth in mm; raises `InputError` for anything else."""
-    depths = check_z_mm(z_range_mm).tolist()
-    if len(depths) != 2 or depths[0] >= depths[1]:
-        raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
-    return depths
 
 
 def _stored_maps(truth: Truth | None, view_z_mm: np.ndarray | None, images: Any) -> dict[str, np.ndarray]:
@@ -184,7 +165,8 @@ def _write_origins(folder: Path, photons: PhotonTruth, counts: PhotonCounts | No
     for name in "klij":
         if not np.array_equal(getattr(photons, name), getattr(events, name).repeat(events.n)):
             raise InputError("truth: photons: not those of the counts, in the order of their events")
-    write_photon_truth(folder, photons.object_id.astype(np.int32), _as_stored(photons.z_mm))
+    arrays = {"object_id": photons.object_id.astype(np.int32), "z_mm": _as_stored(photons.z_mm)}
+    write_arrays_safely(folder, arrays, PHOTON_TRUTH_LABELS)
 
 
 def _write_radiance(root: Path, views: Views) -> None:

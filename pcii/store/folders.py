@@ -1,38 +1,203 @@
-"""Folders that list their files: hashes, lists of files, and the document that makes a folder a finished one.
+"""Folders that list their files: hashes, and the documents that make folders finished ones.
 
-The document is JSON: its format and version and, of all kinds but collections, every file with size and
-SHA-256. It ends in "sha256", a checksum of itself: the SHA-256 of its bytes with 64 zeros in that place.
-
+manifest.json     of a dataset, written last: what it does not list does not belong to the dataset
+collection.json   of a collection: the recipe that its datasets have in common, and the fields that differ
 results.json      of results: their dataset by name and identity, the light, the software
 evaluation.json   of an evaluation: what measured its rows; beside it rows.jsonl, a line of JSON for each
                   dataset, light and method
+
+A document is JSON: its format and version and, of all kinds but collections, every file with size and
+SHA-256. It ends in "sha256", a checksum of itself: the SHA-256 of its bytes with 64 zeros in that place.
+Members that the models here do not name are kept.
 """
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
-from pcii.base import InputError, json_bytes, write_bytes_safely
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    ValidationError,
+)
+from typing_extensions import TypedDict  # pydantic takes that of the standard library from Python 3.12 on
 
-if TYPE_CHECKING:
-    from pcii.store.manifests import EvaluationManifest, Manifest, ResultsManifest
+from pcii.base import InputError, json_bytes, visible, write_bytes_safely
+from pcii.types import MOST_BITS, MOST_DEPTHS, MOST_FRAMES, MOST_PHOTONS, CameraGrid, Scope, check_cfa
 
-AnyManifest = TypeVar("AnyManifest", bound="Manifest")
 Files = Mapping[str, Mapping[str, Any]]
 """Size (`bytes`) and hash (`sha256`) of files by their paths in a folder."""
-LARGEST_DOCUMENT_BYTES = 1 << 27
-"""JSON takes up to 30 times its length in memory."""
-RESULTS = "results.json"
-ROWS = "rows.jsonl"
-EVALUATION = "evaluation.json"
-LOCK = ".lock"
-"""Locked while a run writes to the folder of a collection, and then removed."""
 REMEDY = "delete the folder and make or score it again"
 """How errors about damaged files end."""
+MANIFEST = "manifest.json"
+MARKER = ".unfinished.json"
+"""Present in the folder of a dataset while it is being generated."""
+COLLECTION = "collection.json"
+LOCK = ".lock"
+"""Locked while a run writes to the folder of a collection, and then removed."""
+RESULTS = "results.json"
+EVALUATION = "evaluation.json"
+ROWS = "rows.jsonl"
 _NO_CHECKSUM = "0" * 64
+OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Manifest(BaseModel):
+    """A manifest: attributes for the members that are named here, `[name]` and `get` for all."""
+
+    model_config = OPEN
+
+    def __getitem__(self, name: str) -> Any:
+        return dict(self)[name]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The member of this name, `default` if there is none."""
+        return dict(self).get(name, default)
+
+
+def _path_inside(path: str) -> str:
+    parts = PurePosixPath(path).parts
+    if not parts or path != "/".join(parts) or ".." in parts or path.startswith("/") or "\0" in path:
+        raise ValueError(f"expected a path inside the folder such as counts.zarr/k/zarr.json, got {path!r}")
+    return path
+
+
+def _text(value: Any) -> str:
+    # The str of pydantic rejects names of files with bytes that are not valid characters.
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {type(value).__name__}")
+    return value
+
+
+def _camera_grid(value: Any) -> CameraGrid:
+    try:
+        return CameraGrid(**value)
+    except TypeError as fault:
+        raise ValueError(f"expected the fields of a CameraGrid ({fault})") from None
+
+
+Real = Annotated[float, Field(strict=False)]
+Text = Annotated[Any, AfterValidator(_text)]
+Seconds = Annotated[Real, Field(ge=0)]
+Photons = Annotated[Real, Field(gt=0, le=MOST_PHOTONS)]
+Depth = Annotated[Real, Field(gt=0)]
+ObjectId = Annotated[int, Field(strict=False, gt=-(10**9), lt=10**9)]
+
+
+class FileEntry(TypedDict):
+    """Size and hash of a file."""
+
+    bytes: Annotated[int, Field(ge=0)]
+    sha256: Annotated[str, Field(pattern=re.compile(r"\A[0-9a-f]{64}\Z"))]
+
+
+ListedFiles = dict[Annotated[str, AfterValidator(_path_inside)], FileEntry]
+
+
+class Analysis(TypedDict, total=False):
+    """Depths that the recipe suggests."""
+
+    z_mm: Annotated[list[Depth] | None, Field(max_length=MOST_DEPTHS)]
+    z_range_mm: Annotated[list[Depth] | None, Field(min_length=2, max_length=2)]
+
+
+class RecipePhotons(TypedDict, total=False):
+    """Photon budgets of the recipe."""
+
+    __pydantic_config__ = OPEN  # type: ignore[misc]
+    scope: Scope | None
+    budget: Photons | None
+    nested: list[Photons] | None
+
+
+class Recipe(TypedDict, total=False):
+    """The members of a recipe that this package reads."""
+
+    __pydantic_config__ = OPEN  # type: ignore[misc]
+    scene: str | None
+    seed: int | None
+    photons: RecipePhotons
+
+
+class DatasetManifest(Manifest):
+    """The manifest of a dataset."""
+
+    title: Text | None = None
+    licence: Text | None = None
+    citation: Text | None = None
+    origin: Text | None = None
+    identity: str | None = None
+    grid: Annotated[InstanceOf[CameraGrid], BeforeValidator(_camera_grid)]
+    cfa: Annotated[str | None, AfterValidator(check_cfa)]
+    frames: Annotated[int, Field(ge=1, le=MOST_FRAMES)] = 1
+    bits: Annotated[int, Field(ge=1, le=MOST_BITS)] | None = None
+    radiance_channels: Literal[1, 3] | None = None
+    radiance_unit: Text | None = None
+    objects: dict[ObjectId, Text] = {}
+    unscored: list[ObjectId] = []
+    are_objects_known: bool = True
+    analysis: Analysis | None = None
+    photon_budget: Photons | None = None
+    recipe: Recipe = {}
+    backend: dict[str, Any] | None = None
+    photons: dict[str, Any] | None = None
+    skipped: list[dict[str, Any]] = []
+    timings_s: dict[str, Seconds] = {}
+    versions: dict[str, Text] = {}
+    files: ListedFiles
+    packed: list[Text] = []
+    """Paths of the files that are in its archive `arrays.zip`."""
+
+
+class CollectionManifest(Manifest):
+    """What the datasets of a collection have in common: their recipe, but for the `fields` that differ."""
+
+    fields: list[str]
+    recipe: dict[str, Any] = {}
+    versions: dict[str, Text] = {}
+
+
+class ResultsManifest(Manifest):
+    """The manifest of results: the dataset and light that they are of, and `own_software` of then."""
+
+    dataset: Text
+    identity: str
+    light: Photons | Literal["full-light"] | None
+    versions: dict[str, Text] = {}
+    files: ListedFiles
+
+
+class EvaluationManifest(Manifest):
+    """The manifest of an evaluation, beside the figures of its tables."""
+
+    files: ListedFiles
+
+
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
+AnyManifest = TypeVar("AnyManifest", bound=Manifest)
+
+
+def validated(model: type[AnyModel], document: Mapping[str, Any]) -> AnyModel:
+    """The document as a model; raises `InputError` that names the first member that does not fit."""
+    try:
+        return model.model_validate(document)
+    except ValidationError as fault:
+        raise InputError(first_fault(fault)) from None
+
+
+def first_fault(fault: ValidationError) -> str:
+    """The first member that does not fit a model, and what is wrong with it."""
+    first = fault.errors(include_url=False)[0]
+    member = ".".join(str(step) for step in first["loc"] if step != "[key]")
+    return visible(": ".join(filter(None, (member, first["msg"].removeprefix("Value error, ")))))
 
 
 def hash_bytes(content: bytes) -> str:
@@ -47,11 +212,7 @@ def hash_file(path: Path) -> str:
 
 
 def hash_json(value: Any) -> str:
-    """SHA-256, in hex, of a value that JSON can hold; the order of members of objects does not matter.
-
-    >>> hash_json({"a": 1, "b": [2]}) == hash_json({"b": (2,), "a": 1})
-    True
-    """
+    """SHA-256, in hex, of a value that JSON can hold; the order of members of objects does not matter."""
     return hash_bytes(json.dumps(value, sort_keys=True).encode())
 
 
@@ -83,10 +244,7 @@ def check_size(root: Path, name: str, entry: Mapping[str, Any]) -> None:
 def read_listed(root: Path, name: str, entry: Mapping[str, Any]) -> bytes:
     """Content of a listed file; `InputError` if it is missing, or has another size or hash."""
     check_size(root, name, entry)
-    try:
-        content = (root / name).read_bytes()
-    except OSError as fault:
-        raise InputError(f"{root / name}: cannot be read ({fault.strerror}); {REMEDY}") from None
+    content = (root / name).read_bytes()
     if hash_bytes(content) != entry["sha256"]:
         raise InputError(f"{root / name}: its content does not match the manifest's SHA-256; {REMEDY}")
     return content
@@ -104,24 +262,27 @@ def unlisted_files(root: Path, listed: Iterable[str]) -> list[str]:
     return sorted(present - set(listed))
 
 
-def read_small(path: Path, limit: int, remedy: str) -> bytes:
-    """Content of a regular file of at most `limit` bytes; raises `InputError` for any other."""
-    if not path.is_file():
-        raise InputError(f"{path}: missing; {remedy}")
+def entries(folder: Path, what: str) -> set[str]:
+    """Names in a folder for `what`, none if there is no folder; raises `InputError` for a file."""
     try:
-        with path.open("rb") as file:
-            content = file.read(limit + 1)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
-    if len(content) > limit:
-        raise InputError(f"{path}: larger than the {limit} bytes that such a file has at most; {remedy}")
-    return content
+        return {entry.name for entry in folder.iterdir()}
+    except FileNotFoundError:
+        return set()
+    except NotADirectoryError:
+        raise InputError(f"{folder}: this is a file; name a folder for the {what}") from None
+
+
+def check_free(folder: Path, what: str) -> None:
+    """Raise `InputError` unless a folder for `what` is new or empty."""
+    if entries(folder, what):
+        raise InputError(f"{folder}: holds something else; name a new or empty folder")
 
 
 @dataclass(frozen=True)
-class FolderKind:
+class FolderKind(Generic[AnyManifest]):
     """A kind of folder, such as that of a dataset, and the document that makes a folder a finished one."""
 
+    model: type[AnyManifest]
     what: str
     document: str
     version: int
@@ -153,10 +314,8 @@ class FolderKind:
         before, after = blank.rsplit(_NO_CHECKSUM.encode(), 1)
         write_bytes_safely(folder / self.document, before + hash_bytes(blank).encode() + after)
 
-    def read(self, folder: Path, model: "type[AnyManifest]") -> "AnyManifest":
-        """The document as `model`; `InputError` if it is missing, changed, of another format, or no such."""
-        from pcii.store.manifests import validated
-
+    def read(self, folder: Path) -> AnyManifest:
+        """The document; `InputError` if it is missing, changed, or of another format or content."""
         path = folder / self.document
         if not folder.is_dir():
             raise InputError(f"{folder}: there is no such {self.what} folder")
@@ -164,7 +323,7 @@ class FolderKind:
             raise InputError(
                 f"{folder}: not a finished {self.what} (no {self.document}); `{self.command}` makes one"
             )
-        content = read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY)
+        content = path.read_bytes()
         try:
             document = json.loads(content)
             checksum = document.pop("sha256").encode()
@@ -173,40 +332,25 @@ class FolderKind:
                 raise ValueError("its checksum does not match")
             if (document.get("format"), document.get("format_version")) != (self.format, self.version):
                 raise ValueError(f"expected a {self.format} of version {self.version}")
-            return validated(model, document)
+            return validated(self.model, document)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as fault:
             raise InputError(f"{path}: damaged, or of another release ({fault}); {REMEDY}") from None
 
 
-def entries(folder: Path, what: str) -> set[str]:
-    """Names in a folder for `what`, none if there is no folder; raises `InputError` for a file."""
-    try:
-        return {entry.name for entry in folder.iterdir()}
-    except FileNotFoundError:
-        return set()
-    except NotADirectoryError:
-        raise InputError(f"{folder}: this is a file; name a folder for the {what}") from None
+DATASET_FOLDER = FolderKind(
+    DatasetManifest, "dataset", MANIFEST, 2, "simgen generate", frozenset({MANIFEST, MARKER})
+)
+COLLECTION_FOLDER = FolderKind(
+    CollectionManifest, "collection", COLLECTION, 1, "simgen generate", frozenset({COLLECTION})
+)
+RESULTS_FOLDER = FolderKind(ResultsManifest, "results", RESULTS, 4, "pcii run", frozenset({RESULTS}))
+EVALUATION_FOLDER = FolderKind(
+    EvaluationManifest, "evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS})
+)
 
 
-def check_free(folder: Path, what: str) -> None:
-    """Raise `InputError` unless a folder for `what` is new or empty."""
-    if entries(folder, what):
-        raise InputError(f"{folder}: holds something else; name a new or empty folder")
-
-
-RESULTS_FOLDER = FolderKind("results", RESULTS, 4, "pcii run", frozenset({RESULTS}))
-EVALUATION_FOLDER = FolderKind("evaluation", EVALUATION, 3, "pcii evaluate", frozenset({ROWS}))
-
-
-def read_results(out: Path) -> "ResultsManifest":
-    """The document of a folder of results; raises `InputError` if it is missing or damaged."""
-    from pcii.store.manifests import ResultsManifest
-
-    return RESULTS_FOLDER.read(out, ResultsManifest)
-
-
-def read_evaluation(out: Path) -> "EvaluationManifest":
-    """Content of evaluation.json; raises `InputError` if it is missing, not yet there or damaged."""
-    from pcii.store.manifests import EvaluationManifest
-
-    return EVALUATION_FOLDER.read(out, EvaluationManifest)
+def read_manifest(root: Path) -> DatasetManifest:
+    """The manifest of a finished dataset; `InputError` if it is unfinished, or the manifest is damaged."""
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
+    return DATASET_FOLDER.read(root)

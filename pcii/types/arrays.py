@@ -65,6 +65,25 @@ def read_only(array: np.ndarray) -> np.ndarray:
     return view
 
 
+def freeze_array(owner: object, name: str, dtype: str, shape: tuple[int | str, ...]) -> None:
+    """Make an array of a frozen dataclass one that cannot be written to; `InputError` if it is no such array.
+
+    The dtype "real numbers" stands for all real numbers, and a word in place of a size for any size.
+    """
+    values = getattr(owner, name)
+    fits = (
+        isinstance(values, np.ndarray)
+        and (values.dtype.kind in "fiu" if dtype == "real numbers" else values.dtype == dtype)
+        and values.ndim == len(shape)
+        and all(isinstance(size, str) or size == own for size, own in zip(shape, values.shape, strict=True))
+    )
+    if not fits:
+        is_array = isinstance(values, np.ndarray)
+        got = f"{values.dtype} {values.shape}" if is_array else type(values).__name__
+        raise InputError(f"{name}: expected {dtype} ({', '.join(map(str, shape))}), got {got}")
+    object.__setattr__(owner, name, read_only(values))
+
+
 def check_z_mm(z_mm: object) -> np.ndarray:
     """Depths in mm as a float64 array (Z,), from one number or a list.
 
@@ -79,10 +98,21 @@ def check_z_mm(z_mm: object) -> np.ndarray:
         raise InputError(f"z_mm: expected depths in millimetres, got {z_mm!r}") from None
     if z.ndim != 1 or z.size == 0:
         raise InputError("z_mm: expected one depth or a list of depths in millimetres")
-    if not np.all(np.isfinite(z) & (z > 0)):
-        bad = z[~(np.isfinite(z) & (z > 0))][0]
-        raise InputError(f"z_mm: a depth must be a finite number above 0 mm, got {bad:g}")
+    is_depth = np.isfinite(z) & (z > 0)
+    if not is_depth.all():
+        raise InputError(f"z_mm: a depth must be a finite number above 0 mm, got {z[~is_depth][0]:g}")
     return z
+
+
+def check_depth_range(z_range_mm: object) -> tuple[float, float]:
+    """The nearest and farthest depth in mm of a range; raises `InputError` for anything else."""
+    depths = check_z_mm(z_range_mm).tolist()
+    if len(depths) != 2:
+        raise InputError(f"z_range_mm: expected two depths in mm, (near, far), got {z_range_mm!r}")
+    near, far = depths
+    if near >= far:
+        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    return near, far
 
 
 def whole_counts(name: str, values: np.ndarray) -> np.ndarray:

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, ShortForm, listed, span, times
-from pcii.types.arrays import Plottable, read_only
-from pcii.types.focal_planes import FocalPlanes
-from pcii.types.section_stack import Sections
+from pcii.types.arrays import Plottable, freeze_array
+from pcii.types.focal_planes import FocalPlanes, Sections
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,15 +31,10 @@ class Segmented(Plottable):
     def __post_init__(self) -> None:
         if not isinstance(self.sections, Sections):
             raise InputError(f"sections: expected Sections, got {type(self.sections).__name__}")
-        shape, events = self.sections.counts.shape[:3], self.photon_in_focus
-        if not _is_bool(self.in_focus) or self.in_focus.shape != shape:
-            raise InputError(f"in_focus: expected bool {shape}, got {_described(self.in_focus)}")
-        object.__setattr__(self, "in_focus", read_only(self.in_focus))
-        if events is None:
-            return
-        if not _is_bool(events) or events.ndim != 2 or events.shape[0] != shape[0]:
-            raise InputError(f"photon_in_focus: expected bool ({shape[0]}, events), got {_described(events)}")
-        object.__setattr__(self, "photon_in_focus", read_only(events))
+        shape = self.sections.counts.shape[:3]
+        freeze_array(self, "in_focus", "bool", shape)
+        if self.photon_in_focus is not None:
+            freeze_array(self, "photon_in_focus", "bool", (shape[0], "events"))
 
     def _facts(self) -> dict[str, object]:
         shares = listed([f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))])
@@ -68,13 +62,8 @@ class DepthMap(Plottable):
     hot_pixels: int = 0
 
     def __post_init__(self) -> None:
-        for name, values in (("z_mm", self.z_mm), ("confidence", self.confidence)):
-            if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
-                raise InputError(f"{name}: expected real numbers (H, W), got {_described(values)}")
-        if self.z_mm.ndim != 2 or self.confidence.shape != self.z_mm.shape:
-            raise InputError("z_mm, confidence: expected two maps (H, W) of the same shape")
-        object.__setattr__(self, "z_mm", read_only(self.z_mm))
-        object.__setattr__(self, "confidence", read_only(self.confidence))
+        freeze_array(self, "z_mm", "real numbers", ("H", "W"))
+        freeze_array(self, "confidence", "real numbers", self.z_mm.shape)
 
     def _facts(self) -> dict[str, object]:
         answered = self.z_mm[np.isfinite(self.z_mm)]
@@ -105,18 +94,11 @@ class DepthPosterior(ShortForm):
 
     def __post_init__(self) -> None:
         h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
-        shapes = {
-            "probability": (len(self.planes), h, w),
-            "no_surface": (h, w),
-            "in_focus": (len(self.in_focus), h, w),
-            "is_detected": (h, w),
-            "is_supported": (h, w),
-        }
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            if values.shape != shape:
-                raise InputError(f"{name}: expected {shape}, got {values.shape}")
-            object.__setattr__(self, name, read_only(values))
+        freeze_array(self, "probability", "real numbers", (len(self.planes), h, w))
+        freeze_array(self, "no_surface", "real numbers", (h, w))
+        freeze_array(self, "in_focus", "real numbers", ("requested planes", h, w))
+        freeze_array(self, "is_detected", "bool", (h, w))
+        freeze_array(self, "is_supported", "bool", (h, w))
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
@@ -167,12 +149,3 @@ class Score(ShortForm):
         rows = {name: [dict(row) for row in getattr(self, name)] for name in ("planes", "objects")}
         others = {"depth": dict(self.depth), "bounds": dict(self.bounds), "readout": self.readout}
         return {"dataset": self.dataset, **rows, **others}
-
-
-def _is_bool(values: object) -> bool:
-    return isinstance(values, np.ndarray) and values.dtype == np.bool_
-
-
-def _described(values: object) -> str:
-    """What was given instead of an array that was expected."""
-    return f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__

@@ -1,22 +1,85 @@
-"""Focal planes: the depths of sections, and by how much the views shift for each.
+"""Where parallel cameras see a point, the focal planes of sections, and the sections.
 
+A point (X, Y, Z) appears in camera (k, l) at column (W-1)/2 + (l - (L-1)/2) s + (focal / pixel)
+(X - X_l) / Z and likewise in rows, so without shear a camera further right sees it further LEFT.
 Public functions take depths as numbers or planes and pass planes on: depths are checked and converted to
-disparities and shifts once, here. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
+disparities and shifts once, here. Notation: d disparity in px per camera step; (K, L) cameras; (H, W) pixels
+of a view; Z planes; z planar depth; s shear.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from pcii.base import InputError, ShortForm, listed
-from pcii.types.arrays import check_z_mm, read_only
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
+from pcii.base import InputError, ShortForm, listed, times
+from pcii.types.arrays import Plottable, check_z_mm, freeze_array, read_only
+from pcii.types.cameras import PLAIN, CameraGrid, Readout, check_cfa, colours_and_samples
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts, PhotonEvents
 from pcii.types.truth import PhotonTruth
+
+Shifts = Literal["nearest", "even"]
+
+
+def project_px(
+    grid: CameraGrid, point_mm: tuple[float, float, float], k: float, l: float
+) -> tuple[float, float]:
+    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers.
+
+    The virtual centre is the camera ((K-1)/2, (L-1)/2).
+    """
+    X, Y, Z = point_mm
+    down, right = k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2
+    scale_px = grid.focal_mm / grid.pixel_mm / Z
+    i = (grid.height - 1) / 2 + down * grid.shear_px[1] + scale_px * (Y - down * grid.pitch_mm[1])
+    j = (grid.width - 1) / 2 + right * grid.shear_px[0] + scale_px * (X - right * grid.pitch_mm[0])
+    return i, j
+
+
+def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """(horizontal, vertical) disparity at depth z due to the camera pitch alone, in px per camera step."""
+    # Lengths whose product no float64 holds give 0, infinity or NaN; `FocalPlanes` refuses the last two.
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
+        return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
+
+
+def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """(horizontal, vertical) disparity at depth z in px per camera step: parallax less shear."""
+    across, down = parallax_px(grid, z_mm)
+    return across - grid.shear_px[0], down - grid.shear_px[1]
+
+
+def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
+    """Parallax between the outermost cameras of the longer axis of the grid in px: (N - 1) d, without shear.
+
+    >>> grid = CameraGrid(
+    ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
+    ... )
+    >>> total_disparity_px(grid, np.array([500.0, 1000.0])).tolist()
+    [20.0, 10.0]
+    """
+    d_x, d_y = parallax_px(grid, z_mm)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
+
+
+def parallax_per_total(grid: CameraGrid) -> np.ndarray:
+    """(horizontal, vertical) parallax from camera to camera as a share of the total disparity, (2,)."""
+    return np.array(parallax_px(grid, 1.0)) / total_disparity_px(grid, 1.0)
+
+
+def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
+    """Half-extent in px of the blur of a point at z in the section at z0: total disparity's change / 2."""
+    return np.abs(total_disparity_px(grid, z_mm) - total_disparity_px(grid, z0_mm)) / 2
+
+
+def depth_of_total_disparity_mm(grid: CameraGrid, total_px: np.ndarray) -> np.ndarray:
+    """Depths in mm whose total disparity is `total_px`: the inverse of `total_disparity_px`."""
+    return float(total_disparity_px(grid, 1.0)) / np.asarray(total_px, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,8 +98,8 @@ class FocalPlanes(ShortForm):
     """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "z_mm", read_only(self.z_mm))
-        object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
+        freeze_array(self, "z_mm", "real numbers", ("Z",))
+        freeze_array(self, "total_disparity_px", "real numbers", self.z_mm.shape)
         across, down = np.abs(disparity_px(self.grid, self.z_mm))
         with np.errstate(over="ignore"):
             countable = np.maximum(across * self.grid.cols, down * self.grid.rows) < 2**31
@@ -53,7 +116,7 @@ class FocalPlanes(ShortForm):
         >>> grid = CameraGrid(
         ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
         ... )
-        >>> FocalPlanes.at_depths(grid, [500, 1000]).whole_shifts_px[1].tolist()
+        >>> FocalPlanes.at_depths(grid, [500, 1000]).nearest_shifts_px()[1].tolist()
         [[-10, 0, 10], [-5, 0, 5]]
         """
         if isinstance(z_mm, FocalPlanes):
@@ -109,13 +172,7 @@ class FocalPlanes(ShortForm):
         cols = (np.arange(self.grid.cols) - (self.grid.cols - 1) / 2) * across[:, None]
         return read_only(rows), read_only(cols)
 
-    @cached_property
-    def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The shifts of rows (Z, K) and columns (Z, L) to whole pixels, floor(x + `rounding`), int32."""
-        rows, cols = self.nearest_shifts_px(1)
-        return read_only(rows.astype(np.int32)), read_only(cols.astype(np.int32))
-
-    def nearest_shifts_px(self, step_px: int) -> tuple[np.ndarray, np.ndarray]:
+    def nearest_shifts_px(self, step_px: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """The shifts of rows (Z, K) and columns (Z, L) to multiples of `step_px`, int64.
 
         They are the nearest for a `rounding` of 1/2: `floor(x + 1/2)` and not `round`, which rounds half to
@@ -152,6 +209,81 @@ class FocalPlanes(ShortForm):
         row, col = rows[photons.k, photons.i].astype(np.int64), cols[photons.l, photons.j].astype(np.int64)
         height, width = self.grid.height * subpixel, self.grid.width * subpixel
         return row, col, (row >= 0) & (row < height) & (col >= 0) & (col < width)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sections(Plottable):
+    """Sections of the scene at `planes`, in the frame of the virtual centre camera.
+
+    `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons, real
+    numbers for radiance. `samples` is their `coverage`, or a function that makes it when it is first asked
+    for: on one plane that takes as long as adding 100 000 photons. With `subpixel` = M the voxel grid is M
+    times finer in both axes. `variance` (Z, H, W, C) is that of the samples of each voxel, or None. `cfa` is
+    the Bayer pattern of sections that are mosaics themselves (of even shifts), `readout` that of the counts.
+    Raises `InputError` if the shapes differ. `pcii.reconstruct` makes them.
+    """
+
+    planes: FocalPlanes
+    counts: np.ndarray
+    samples: np.ndarray | Callable[[], np.ndarray]
+    subpixel: int = 1
+    variance: np.ndarray | None = None
+    cfa: str | None = None
+    readout: Readout = PLAIN
+
+    def __post_init__(self) -> None:
+        Z, H, W = len(self.planes), self.grid.height * self.subpixel, self.grid.width * self.subpixel
+        freeze_array(self, "counts", "real numbers", (Z, H, W, "C"))
+        if isinstance(self.samples, np.ndarray):
+            self.coverage  # noqa: B018 an array of another shape is reported here
+        check_cfa(self.cfa)
+        if self.variance is not None:
+            freeze_array(self, "variance", "real numbers", self.counts.shape)
+
+    def _facts(self) -> dict[str, object]:
+        photons = None
+        if self.counts.dtype.kind in "iu":  # every plane is made of the same photons
+            photons = listed([int(plane.sum(dtype=np.int64)) for plane in self.counts])
+        return {
+            "z_mm": listed(self.z_mm.tolist()),
+            "shape": times(self.counts.shape),
+            "photons": photons,
+            "subpixel": self.subpixel,
+            "cfa": self.cfa,
+        }
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras."""
+        return self.planes.grid
+
+    @property
+    def z_mm(self) -> np.ndarray:
+        """Depths of the planes (Z,) float64."""
+        return self.planes.z_mm
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """Number of the samples that meet at each voxel, (Z, H, W, C)."""
+        coverage = self.samples if isinstance(self.samples, np.ndarray) else self.samples()
+        if coverage.shape != self.counts.shape:
+            raise InputError("coverage: must have the shape of counts")
+        return read_only(coverage)
+
+    @cached_property
+    def estimate(self) -> np.ndarray:
+        """Photons (or radiance) per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
+
+        For photon counts it is the maximum-likelihood estimate of the photons per pixel and view;
+        Eq. 3 divides it further by the photon budget n, and the sum by R S, the number of cameras, which
+        darkens borders; here it is divided by the coverage. A voxel that no sample reaches is 0. What frames
+        of few bits miss is made up for: see `Readout.photons`.
+        """
+        return read_only(self.readout.photons(self.counts, self.coverage))
+
+    def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""
+        return colours_and_samples(self.counts[plane], self.cfa, self.coverage[plane])
 
 
 def check_data(data: object) -> None:

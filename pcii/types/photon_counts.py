@@ -1,17 +1,14 @@
 """Photon counts of the elemental images, as sparse events or as a dense stack, and their frames."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from pcii.base import InputError, ShortForm, times
-from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
-from pcii.types.bayer import channel_count, check_cfa, colour_cells
-from pcii.types.camera_grid import CameraGrid
-from pcii.types.readout import PLAIN, Readout
+from pcii.types.arrays import Plottable, read_only, whole_counts
+from pcii.types.cameras import PLAIN, CameraGrid, Readout, channel_count, check_cfa, colour_cells
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,19 +34,6 @@ class FrameEvents:
     i: np.ndarray
     j: np.ndarray
     frame: np.ndarray
-
-
-def _checked_pixels(columns: Mapping[str, np.ndarray], grid: CameraGrid) -> tuple[np.ndarray, ...]:
-    """Lists k, l, i, j of cameras and pixels as int32; `InputError` for an index outside the grid."""
-    pixels = []
-    for (name, values), limit in zip(columns.items(), grid.shape_KLHW, strict=True):
-        column = whole_counts(name, np.atleast_1d(values))
-        if column.ndim != 1:
-            raise InputError(f"{name}: expected a one-dimensional list")
-        if column.size and column.max() >= limit:
-            raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
-        pixels.append(column.astype(np.int32))
-    return tuple(pixels)
 
 
 def _events_of(pixels: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
@@ -172,7 +156,15 @@ class PhotonCounts(Plottable):
         (3, [0, 0, 0, 0, 2, 0])
         """
         _check_sensor(grid, cfa)
-        pixels = _checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
+        columns: list[np.ndarray] = []
+        for name, values, size in zip("klij", (k, l, i, j), grid.shape_KLHW, strict=True):
+            column = whole_counts(name, np.atleast_1d(values))
+            if column.ndim != 1:
+                raise InputError(f"{name}: expected a one-dimensional list")
+            if column.size and column.max() >= size:
+                raise InputError(f"{name}: index {column.max()} is outside 0 .. {size - 1}")
+            columns.append(column.astype(np.int32))
+        pixels = tuple(columns)
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*pixels, photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
@@ -275,7 +267,9 @@ class PhotonCounts(Plottable):
         ([[0.288, 0.693]], [[0.0, inf]])
         """
         image, number = self.view(k, l), self.readout.frames
-        first, end = (0, number) if frames is None else _checked_range(frames, number)
+        first, end = frames or (0, number)
+        if not 0 <= first < end <= number:
+            raise InputError(f"frames: expected (first, end), 0 <= first < end <= {number}, got {frames!r}")
         if end - first < number:
             if self.frame is None:
                 raise InputError(f"frames: only the sums over all {number} frames were stored")
@@ -327,10 +321,3 @@ def _check_sensor(grid: object, cfa: str | None) -> None:
     if not isinstance(grid, CameraGrid):
         raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
     check_cfa(cfa)
-
-
-def _checked_range(frames: object, number: int) -> tuple[int, int]:
-    match frames:
-        case (first, end) if is_whole(first) and is_whole(end) and 0 <= first < end <= number:
-            return first, end
-    raise InputError(f"frames: expected (first, end) with 0 <= first < end <= {number}, got {frames!r}")

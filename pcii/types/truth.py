@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from pcii.base import InputError, listed, span, times
-from pcii.types.arrays import Plottable, read_only
+from pcii.types.arrays import Plottable, freeze_array
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 """Maps that a dataset may lack."""
@@ -54,8 +54,9 @@ class Truth(Plottable):
     are_objects_known: bool = True
 
     def __post_init__(self) -> None:
-        if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
-            raise InputError("z_mm, object_id: expected two maps (H, W) of the same shape")
+        freeze_array(self, "z_mm", "real numbers", ("H", "W"))
+        shape = self.z_mm.shape
+        freeze_array(self, "object_id", "real numbers", shape)
         if not (self.z_mm > 0).all():
             raise InputError("z_mm: true depths are above 0 mm and never NaN; a miss is +inf")
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
@@ -63,13 +64,14 @@ class Truth(Plottable):
             raise InputError(f"object_id: id {min(unknown)} has no name")
         if nameless := set(self.unscored) - set(self.names):
             raise InputError(f"unscored: there is no object with the number {min(nameless)}")
-        shape = self.z_mm.shape
-        _check_map("normal", self.normal, (*shape, 3), np.float32, -1, 1)
-        _check_map("coverage", self.coverage, shape, np.float32, 0, 1)
-        _check_map("visible_views", self.visible_views, shape, np.uint16, 0, np.inf)
-        for name in ("z_mm", "object_id", *OPTIONAL_MAPS):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, read_only(getattr(self, name)))
+        if self.visible_views is not None:
+            freeze_array(self, "visible_views", "uint16", shape)
+        for name, lowest, last_axes in (("normal", -1, (3,)), ("coverage", 0, ())):
+            values = getattr(self, name)
+            if values is not None:
+                freeze_array(self, name, "float32", (*shape, *last_axes))
+                if not ((values >= lowest - 1e-6) & (values <= 1 + 1e-6)).all():  # they may be rounded
+                    raise InputError(f"{name}: expected values from {lowest} to 1")
 
     def _facts(self) -> dict[str, object]:
         hit = self.z_mm[np.isfinite(self.z_mm)]
@@ -100,15 +102,3 @@ class Truth(Plottable):
         if self.has_objects:
             is_meant &= self.object_id > 0
         return np.where(is_meant, self.z_mm, np.inf)
-
-
-def _check_map(
-    name: str, values: np.ndarray | None, shape: tuple[int, ...], dtype: type, least: float, most: float
-) -> None:
-    """Check an optional map, whose values may exceed their range by rounding, 1e-6."""
-    if values is None:
-        return
-    if values.shape != shape or values.dtype != dtype:
-        raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
-    if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
-        raise InputError(f"{name}: expected values from {least} to {most}")

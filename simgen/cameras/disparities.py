@@ -1,8 +1,8 @@
 """What a camera grid does to depth: disparities, whole-pixel shifts, and colours that meet.
 
-From first principles and without `pcii.types.geometry`, like the cameras: what is checked before a simulation
-must not share a mistake with what reconstructs it. Notation: d disparity in px per camera step, (K, L)
-grid, (k, l) camera. A sample that camera row k sees in row i belongs to row
+From first principles and without `pcii.types.focal_planes`, like the cameras: what is checked before a
+simulation must not share a mistake with what reconstructs it. Notation: d disparity in px per camera
+step, (K, L) grid, (k, l) camera. A sample that camera row k sees in row i belongs to row
 i + floor((k - (K-1)/2) d + 1/2) of a section.
 """
 

@@ -1,7 +1,7 @@
 """Where cameras really stand and which way their pixels look, from first principles.
 
-This is written without `pcii.types.geometry` on purpose: simulation and reconstruction must not be able to
-share a sign mistake. A test renders a dot and finds it where `pcii.types.geometry` says.
+This is written without `pcii.types.focal_planes` on purpose: simulation and reconstruction must not be able
+to share a sign mistake. A test renders a dot and finds it where `pcii.types.focal_planes` says.
 """
 
 import math

@@ -25,7 +25,6 @@ from pcii.store import (
     MARKER,
     check_manifest,
     index_row,
-    read_collection,
     read_index,
     write_index,
 )
@@ -141,7 +140,7 @@ def _begin(series: Series, out: Path) -> None:
     }
     if not any(entry.is_dir() for entry in os.scandir(out)):
         COLLECTION_FOLDER.write(out, document)
-    known = read_collection(out)
+    known = COLLECTION_FOLDER.read(out)
     if any(known.get(name) != value for name, value in document.items()):
         raise other_dataset(out, "collection", known.get("versions", {}))
 

@@ -8,16 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base import InputError, locked
-from pcii.store import (
-    DATASET_FOLDER,
-    MARKER,
-    PACKAGE,
-    DatasetManifest,
-    check_size,
-    read_listed,
-    read_written_manifest,
-    software,
-)
+from pcii.store import DATASET_FOLDER, MARKER, PACKAGE, DatasetManifest, check_size, provenance, read_listed
 
 DECISIVE = (PACKAGE, "mitsuba")
 """Packages whose versions are part of what identifies a dataset."""
@@ -25,18 +16,18 @@ DECISIVE = (PACKAGE, "mitsuba")
 
 def versions() -> dict[str, str]:
     """Versions of the packages that make datasets."""
-    return software.versions(*DECISIVE, "drjit", "numpy", "zarr")
+    return provenance.versions(*DECISIVE, "drjit", "numpy", "zarr")
 
 
 def decisive_versions() -> dict[str, str]:
     """Versions that identify a dataset, with its recipe and scene."""
-    return software.versions(*DECISIVE)
+    return provenance.versions(*DECISIVE)
 
 
 def other_versions(recorded: Mapping[str, str]) -> str:
     """How the decisive versions recorded differ from those here, in words; empty if they are the same."""
     known = {name: number for name, number in recorded.items() if name in DECISIVE}
-    return software.differences(known, decisive_versions())
+    return provenance.differences(known, decisive_versions())
 
 
 def find_finished(out: Path, identity: str, *, content: bool = True) -> DatasetManifest | None:
@@ -53,7 +44,7 @@ def find_finished(out: Path, identity: str, *, content: bool = True) -> DatasetM
 
 def read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
-    manifest = read_written_manifest(out)
+    manifest = DATASET_FOLDER.read(out)
     if manifest.identity != identity:
         raise other_dataset(out, "dataset", manifest.versions)
     check = read_listed if content else check_size

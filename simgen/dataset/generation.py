@@ -13,6 +13,7 @@ from pcii.base import Report, named_in_errors, new_folder_safely, silent, sweep_
 from pcii.store import (
     ARRAYS,
     COUNTS,
+    DATASET_FOLDER,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
@@ -21,8 +22,6 @@ from pcii.store import (
     list_files,
     nested_name,
     pack_arrays,
-    read_written_manifest,
-    write_manifest,
 )
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.photon_counts import draw_from_views, write_counts
@@ -133,9 +132,9 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
         }
         if packed:
             manifest["packed"] = packed
-        write_manifest(out, manifest)
+        DATASET_FOLDER.write(out, manifest)
         marker.unlink()
-    return read_written_manifest(out)
+    return DATASET_FOLDER.read(out)
 
 
 def _write_products(

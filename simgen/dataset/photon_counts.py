@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, Report
-from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_photon_truth
+from pcii.store import COUNTS, PHOTON_TRUTH, PHOTON_TRUTH_LABELS, nested_name, write_arrays_safely
 from pcii.store import write_counts as save_counts
 from pcii.types import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
@@ -113,8 +113,9 @@ def write_counts(
         events = detector.counts_of(of_budget, grid, cfa, sensor, keeps_frames=keeps_frames)
         save_counts(out / nested_name(COUNTS, budget), events)
         if with_origins and of_budget.object_id is not None and of_budget.z_mm is not None:
-            origins = of_budget.object_id.repeat(of_budget.n), of_budget.z_mm.repeat(of_budget.n)
-            write_photon_truth(out / nested_name(PHOTON_TRUTH, budget), *origins)
+            each_photon = {"object_id": of_budget.object_id, "z_mm": of_budget.z_mm}
+            origins = {name: values.repeat(of_budget.n) for name, values in each_photon.items()}
+            write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
         totals = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
             log |= totals

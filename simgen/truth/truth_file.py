@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import Report
-from pcii.store import TRUTH, new_array, new_group_safely
-from pcii.types import TRUTH_LABELS
+from pcii.store import TRUTH, TRUTH_LABELS, new_array, new_group_safely
 from simgen.cameras import Rig, centre_camera
 from simgen.renderer import RenderScene
 from simgen.spec import Products, ViewPass

@@ -7,8 +7,8 @@ import numpy as np
 
 from pcii.app import Outcome, write_report
 from pcii.metrics import score
-from pcii.sections import reconstruct
-from pcii.store import depth_range_of, save_dataset
+from pcii.sections import depth_range_of, reconstruct
+from pcii.store import save_dataset
 from pcii.types import CameraGrid, DepthMap, PhotonCounts, Segmented, Truth, Views
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)

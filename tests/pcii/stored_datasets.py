@@ -10,7 +10,7 @@ import pytest
 from twins import unit_grid
 
 from pcii.base import InputError
-from pcii.store import MANIFEST, save_dataset, write_manifest
+from pcii.store import DATASET_FOLDER, MANIFEST, save_dataset
 from pcii.types import PhotonCounts, PhotonTruth, Truth, Views
 
 GRID = unit_grid(2, 3, 4, 5)
@@ -66,6 +66,6 @@ def flip_a_bit(path: Path, bit: int) -> None:
 def rewrite_manifest(root: Path, **members: Any) -> None:
     """Write a manifest again with other members; one that is `...` is left out."""
     manifest = json.loads((root / MANIFEST).read_text()) | members
-    write_manifest(
+    DATASET_FOLDER.write(
         root, {name: value for name, value in manifest.items() if value is not ... and name != "sha256"}
     )

@@ -12,7 +12,7 @@ from twins import unit_grid
 from pcii.app import load_estimates, save_depth, save_sections, save_segmented
 from pcii.app.results import writing
 from pcii.sections import reconstruct
-from pcii.store import RESULTS, Dataset, DatasetManifest, read_results, verify
+from pcii.store import RESULTS, RESULTS_FOLDER, Dataset, DatasetManifest, verify
 from pcii.types import DepthMap, Light, PhotonCounts, Segmented
 
 GRID = unit_grid(2, 2, 6, 7)
@@ -94,7 +94,7 @@ def test_new_results_replace_those_of_their_name_or_all(saved: Path, tmp_path: P
     assert (saved / "note.txt").read_text() == "looked at"
     assert len(load_estimates(saved, dataset)[0]) == 1
     files = {path.relative_to(saved).as_posix() for path in saved.rglob("*") if path.is_file()}
-    assert set(read_results(saved)["files"]) == files - {RESULTS}
+    assert set(RESULTS_FOLDER.read(saved)["files"]) == files - {RESULTS}
     assert verify(saved) == len(files) - 1
     save(saved, dataset, 1.1, whole=True)
     assert [path.name for path in sorted(saved.iterdir())] == ["depth.zarr", RESULTS]

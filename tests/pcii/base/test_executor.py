@@ -88,17 +88,16 @@ def test_a_process_that_dies_ends_the_work_in_one_sentence(tmp_path: Path) -> No
 COMMAND = """
 import sys
 from pathlib import Path
-from pcii.base import command_line, progress
-from pcii.base.executor import Executor
+from pcii.base import Executor, command_line
 from test_executor import Numbers
 
-progress.LOG_EVERY_S = 0
+command_line.LOG_EVERY_S = 0
 app = command_line.command_app("numbers", "Numbers.")
 
 @app.command
 def work(folder: Path, scheduler: str | None = None):
     work, executor = Numbers(folder, seconds=float(sys.argv[-1])), Executor(1 if scheduler else 2, scheduler)
-    with progress.Stages() as report:
+    with command_line.Stages() as report:
         for count, _ in enumerate(executor.run(work, range(1000)), start=1):
             report("numbers", count, 1000)
 

@@ -120,7 +120,7 @@ def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() ->
 def test_a_posterior_that_does_not_cover_the_film_is_refused() -> None:
     planes = FocalPlanes.at_total_disparity(unit_grid(1, 3, 4, 5), [4.0, 5.0])
     nowhere = np.zeros((2, 2), np.float32)
-    with pytest.raises(ValueError, match=r"probability: expected \(2, 2, 3\), got \(2, 2, 2\)"):
+    with pytest.raises(ValueError, match=r"probability: expected real numbers \(2, 2, 3\), got"):
         DepthPosterior(
             planes, nowhere[None].repeat(2, 0), nowhere, 2, nowhere[None][:0], nowhere > 0, nowhere > 0
         )

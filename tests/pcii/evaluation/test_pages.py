@@ -17,7 +17,8 @@ from pcii.app import Outcome, analyse, write_report
 from pcii.base import visible
 from pcii.evaluation import frame_of, write_evaluation
 from pcii.removal import METHODS
-from pcii.store import depth_range_of, open_dataset, planes_of
+from pcii.sections import depth_range_of, planes_of
+from pcii.store import open_dataset
 from pcii.types import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'

@@ -246,12 +246,10 @@ def about(folder: Path, **members: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["(nothing)", "Brightness", "depth:net", "n\u0435t", "my\u200bnet", "my  net", "\uff4eet"],
-    ids=ascii,
+    "name", ["(nothing)", "Brightness", "depth:net", "my\u200bnet", "my  net", "\uff4eet"], ids=ascii
 )
 def test_names_that_could_be_taken_for_others_are_refused(name: str, tmp_path: Path) -> None:
-    says = f"{SUBMISSION}: method: (expected a name of letters|the name '.*' is taken; choose another one)"
+    says = f"{SUBMISSION}: method: (expected a name of characters|the name '.*' is taken; choose another one)"
     with pytest.raises(InputError, match=says):
         read_submission(about(tmp_path, method=name), "b")
 

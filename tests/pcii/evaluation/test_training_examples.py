@@ -23,7 +23,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     """A red square at 100 mm before even blue light at 200 mm: green pixels count nothing."""
     colours, rng = colour_index(24, 32, "GRBG"), np.random.default_rng(2)
     dense = rng.poisson(4.0, GRID.shape_KLHW) * (colours == 2)
-    rows, cols = pcii.FocalPlanes.at_depths(GRID, Z_MM[:1]).whole_shifts_px
+    rows, cols = pcii.FocalPlanes.at_depths(GRID, Z_MM[:1]).nearest_shifts_px()
     for k, l in np.ndindex(3, 4):
         i, j = 8 - rows[0, k], 12 - cols[0, l]  # whole shifts bring it to rows 8 to 15, columns 12 to 19
         dense[k, l, i : i + 8, j : j + 8] = 200 * (colours[i : i + 8, j : j + 8] == 0)

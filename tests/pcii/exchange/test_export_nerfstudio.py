@@ -11,8 +11,7 @@ from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
 from stored_datasets import rewrite_manifest
 
 import pcii
-from pcii.store import TRUTH, list_files, read_manifest, write_arrays_safely
-from pcii.types import TRUTH_LABELS
+from pcii.store import TRUTH, TRUTH_LABELS, list_files, read_manifest, write_arrays_safely
 
 
 def grid_of(rows: int, cols: int, **changes: Any) -> pcii.CameraGrid:

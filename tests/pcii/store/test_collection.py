@@ -10,6 +10,7 @@ import pytest
 from pcii.base import InputError
 from pcii.store import (
     COLLECTION_FOLDER,
+    DATASET_FOLDER,
     INDEX,
     MANIFEST,
     Collection,
@@ -18,7 +19,6 @@ from pcii.store import (
     read_manifest,
     verify,
     write_index,
-    write_manifest,
 )
 
 GRID = {"rows": 1, "cols": 2, "pitch_mm": (5, 5), "focal_mm": 50, "pixel_mm": 0.05, "height": 4, "width": 6}
@@ -38,7 +38,7 @@ def folder(tmp_path: Path) -> Path:
             (root / name).mkdir()
             recipe = {"scene": "drawn", "scene_number": number, "seed": seed, "photons": {"budget": 100}}
             manifest = {"grid": GRID, "cfa": None, "files": {}, "recipe": recipe, "identity": name}
-            write_manifest(root / name, manifest)
+            DATASET_FOLDER.write(root / name, manifest)
             rows.append(index_row(name, values, read_manifest(root / name), root / name / MANIFEST))
     COLLECTION_FOLDER.write(root, {"fields": FIELDS})
     write_index(root, rows)

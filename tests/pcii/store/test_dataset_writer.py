@@ -132,7 +132,7 @@ SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
     [
         ((COUNTED, Views(LIGHT, OTHER)), {}, "different camera grids"),
         (Views(BRIGHT, GRID), {}, r"view \(0, 0\) is too bright"),
-        (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: expected two depths"),
+        (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: near must be less than far"),
         (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected .* of \(4, 5\)"),
         (COUNTED, {"truth": replace(TRUTH, photons=SHUFFLED)}, "not those of the counts"),
         (COUNTED, {"view_z_mm": np.full(GRID.shape_KLHW, np.nan)}, "view_z_mm: expected depths of"),

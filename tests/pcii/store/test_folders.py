@@ -14,7 +14,6 @@ from pcii.store import (
     DATASET_FOLDER,
     EVALUATION_FOLDER,
     RESULTS_FOLDER,
-    DatasetManifest,
     check_free,
     check_size,
     list_files,
@@ -52,15 +51,15 @@ def test_what_else_there_is_is_refused(kind: Any, tmp_path: Path) -> None:
 
 
 def test_a_document_that_is_missing_or_of_others_is_refused(kind: Any, tmp_path: Path) -> None:
-    path, nowhere, model = tmp_path / kind.document, tmp_path / "nowhere", DatasetManifest
-    assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere, model), nowhere)
-    assert f"`{kind.command}` makes one" in one_sentence(lambda: kind.read(tmp_path, model), tmp_path)
+    path, nowhere = tmp_path / kind.document, tmp_path / "nowhere"
+    assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere), nowhere)
+    assert f"`{kind.command}` makes one" in one_sentence(lambda: kind.read(tmp_path), tmp_path)
     for change in ({"format": "of others"}, {"format_version": kind.version + 1}, {"format_version": None}):
         kind.write(tmp_path, change)
-        assert f"expected a {kind.format}" in one_sentence(lambda: kind.read(tmp_path, model), path)
+        assert f"expected a {kind.format}" in one_sentence(lambda: kind.read(tmp_path), path)
     for content in (b"", b"[]", b'{"\xff": 1}'):
         path.write_bytes(content)
-        assert "damaged" in one_sentence(lambda: kind.read(tmp_path, model), path)
+        assert "damaged" in one_sentence(lambda: kind.read(tmp_path), path)
 
 
 def test_every_bit_and_byte_of_the_manifest_of_a_dataset_is_guarded(tmp_path: Path) -> None:
@@ -71,7 +70,7 @@ def test_every_bit_and_byte_of_the_manifest_of_a_dataset_is_guarded(tmp_path: Pa
     assert hashlib.sha256(content.replace(stated.encode(), b"0" * 64)).hexdigest() == stated
 
     def refused() -> None:
-        one_sentence(lambda: DATASET_FOLDER.read(tmp_path, DatasetManifest), path)
+        one_sentence(lambda: DATASET_FOLDER.read(tmp_path), path)
 
     for bit in range(0, 8 * len(content), 7):
         flip_a_bit(path, bit)

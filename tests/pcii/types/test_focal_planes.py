@@ -44,7 +44,7 @@ def test_disparity_and_blur_are_where_the_cameras_see_a_point(grid, z, z0):
 
 def test_half_pixel_shifts_round_up_and_do_not_alternate():
     grid = unit_grid(5, 4, 8, 8, pitch_mm=(1.0, 0.5))
-    rows, cols = (shifts[0] for shifts in FocalPlanes.at_depths(grid, 1.0).whole_shifts_px)
+    rows, cols = (shifts[0] for shifts in FocalPlanes.at_depths(grid, 1.0).nearest_shifts_px())
     np.testing.assert_array_equal(rows, [-1, 0, 0, 1, 1])  # of -1, -1/2, 0, 1/2, 1
     np.testing.assert_array_equal(cols, [-1, 0, 1, 2])  # of -3/2, -1/2, 1/2, 3/2
 

@@ -51,7 +51,7 @@ def sections() -> Sections:
         (lambda: Views(np.ones((1, 1, 2, 2, 1), ">u2"), FILM), "radiance: .*sRGB"),
         (lambda: Sections(FocalPlanes.at_depths(FILM, [1.0, 2.0]), STACK, STACK), "counts: "),
         (lambda: Segmented(MASKS * 1.0, "none", sections()), "in_focus: expected bool"),
-        (lambda: DepthMap(ONES, ONES[:1]), "z_mm, confidence: "),
+        (lambda: DepthMap(ONES, ONES[:1]), "confidence: expected real numbers "),
         (lambda: Truth(ONES * NAN, IDS, {}), "z_mm: true depths are above 0 mm and never NaN"),
         (lambda: Truth(ONES, IDS + 2, {1: "ball"}), "object_id: id 2 has no name"),
         (lambda: Truth(ONES, IDS, {}, coverage=ONES), r"coverage: expected float32 \(2, 2\)"),

@@ -11,7 +11,7 @@ from digests import digest
 from tiny import GRID_2_X_3
 
 from pcii.base import Executor, InputError, WorkerLostError, command_line, locked
-from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, open_dataset, software, verify
+from pcii.store import CARD, COLLECTION, INDEX, MARKER, open_collection, open_dataset, provenance, verify
 from simgen.app import commands as cli
 from simgen.dataset import dataset_collection, generate, generate_collection
 from simgen.spec import Sweep, load_recipe, load_sweep
@@ -120,8 +120,8 @@ def test_what_is_not_this_collection_is_refused(
     lock = locked(tmp_path / "busy" / dataset_collection.LOCK, tmp_path / "busy")
     with lock, pytest.raises(InputError, match="another run writes here"):
         generate_collection(sweep_of(recipe_file), tmp_path / "busy")
-    original = software.version
-    monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
+    original = provenance.version
+    monkeypatch.setattr(provenance, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)
 

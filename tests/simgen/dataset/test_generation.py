@@ -16,7 +16,7 @@ from tiny import TINY_RECIPE
 from zarr.storage import ZipStore
 
 from pcii.base import InputError
-from pcii.store import ARRAYS, MANIFEST, MARKER, RADIANCE, TRUTH, open_dataset, software, verify
+from pcii.store import ARRAYS, MANIFEST, MARKER, RADIANCE, TRUTH, open_dataset, provenance, verify
 from simgen.cameras import rig_of
 from simgen.dataset import Prepared, generate, rendered_views
 from simgen.spec import Recipe
@@ -166,11 +166,11 @@ def test_what_other_software_made_is_refused_and_untouched(
     def killed(*_: object, **__: object) -> np.ndarray:
         raise KeyboardInterrupt
 
-    out, original = tmp_path / "begun", software.version
+    out, original = tmp_path / "begun", provenance.version
     monkeypatch.setattr(rendered_views, "render_view", killed)
     with pytest.raises(KeyboardInterrupt):
         generate(recipe(), Path(), out)
-    monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
+    monkeypatch.setattr(provenance, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     before = digest(out)
     for folder, what in ((made, "holds the dataset"), (out, "holds the unfinished dataset")):
         with pytest.raises(InputError, match=f"{what} of other software.*mitsuba .* is now 9.9"):

@@ -9,7 +9,7 @@ import tomli_w
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.store import TRUTH, software
+from pcii.store import TRUTH, provenance
 from simgen.dataset import Prepared, generate, prepare
 from simgen.spec import Analysis, Recipe
 
@@ -120,8 +120,8 @@ def test_every_byte_of_a_scenes_files_is_part_of_the_identity(near: Path) -> Non
 
 @pytest.mark.parametrize("package", ["photon-integral-imaging", "mitsuba"])
 def test_versions_are_part_of_the_identity(near: Path, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
-    before, original = identity(near, RECIPE, SCENE), software.version
-    monkeypatch.setattr(software, "version", lambda name: "0.0.1" if name == package else original(name))
+    before, original = identity(near, RECIPE, SCENE), provenance.version
+    monkeypatch.setattr(provenance, "version", lambda name: "0.0.1" if name == package else original(name))
     assert identity(near, RECIPE) != before
 
 

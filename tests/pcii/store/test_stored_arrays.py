@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from stored_datasets import flip_a_bit, one_sentence
 
-from pcii.store import list_files, read_array, read_part, write_arrays_safely
-from pcii.types import Label
+from pcii.store import Label, list_files, read_array, read_part, write_arrays_safely
 
 Y = Label(("step",), "three numbers", "mm")
 METADATA = "zarr.json"
