@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base import InputError
-from pcii.exchange.array_files import open_array
-from pcii.exchange.pixel_files import decode, kind_of, picture_of
-from pcii.exchange.stated_cameras import Note
+from pcii.exchange.number_files import decode, kind_of, open_array, picture_of
+from pcii.exchange.stated_images import Note
 from pcii.types import CameraGrid, Truth
 
 DEPTH_PICTURES = ("PNG", "TIFF", "EXR", "PFM")
@@ -94,7 +93,7 @@ NO_DEPTH = DepthFile()
 
 def _numbers_in(path: Path, key: str | None) -> np.ndarray:
     """The numbers (H, W) of a file of depth."""
-    kind = kind_of(path) if path.is_file() else None
+    kind = kind_of(path)
     if kind is None:
         try:
             return np.squeeze(open_array(path, key))
@@ -104,7 +103,7 @@ def _numbers_in(path: Path, key: str | None) -> np.ndarray:
     if channel is not None:
         return channel
     picture = picture_of(path, DEPTH_PICTURES)
-    pixels = next(decode(picture))
+    pixels = decode(picture)[0]
     if picture.pages > 1 or (pixels != pixels[..., :1]).any():
         raise InputError(f"--depth: {path} has colours or several pages; expected one map of depth")
     return pixels[..., 0]

@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base import InputError, Report, silent
-from pcii.exchange.array_files import open_array
 from pcii.exchange.count_arrays import import_counts
-from pcii.exchange.export_pictures import MM_PER_M
-from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
-from pcii.exchange.image_folders import radiance_of_files, views_of
-from pcii.exchange.pixel_files import Encoding
-from pcii.exchange.stated_cameras import Note, warn
+from pcii.exchange.elemental_images import radiance_of_files, views_of
+from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
+from pcii.exchange.number_files import open_array
+from pcii.exchange.posed_exports import MM_PER_M
+from pcii.exchange.stated_images import Encoding, Note, warn
 from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
 from pcii.types import CameraGrid, PhotonCounts, Views
 
@@ -126,15 +125,15 @@ def camera_grid_of(
 
     Raises `InputError` for more than one length of the film.
     """
-    lengths = [length for length in (focal_mm, pixel_mm, sensor_mm) if length is not None]
-    if len(lengths) > 1:
+    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
+    if missing < 2:
         raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
     if focal_mm is not None:
         pixel_mm = focal_mm / file.focal_px
     else:
         pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
         focal_mm = _digits(file.focal_px * pixel_mm)
-    if not lengths:
+    if missing == 3:
         note(
             f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
             "its ratio, and nothing else of them matters"

@@ -16,7 +16,7 @@ from .geometry import depth_of_total_disparity_mm as depth_of_total_disparity_mm
 from .geometry import parallax_per_total as parallax_per_total, parallax_px as parallax_px
 from .geometry import project_px as project_px, total_disparity_px as total_disparity_px
 from .images import Views as Views, binary_scale as binary_scale
-from .photon_counts import FrameEvents as FrameEvents, PhotonCounts as PhotonCounts
+from .photon_counts import PhotonCounts as PhotonCounts
 from .photon_limit import EXPOSURE as EXPOSURE, FULL_LIGHT as FULL_LIGHT, Light as Light
 from .photon_limit import MOST_PHOTONS as MOST_PHOTONS, Scope as Scope, limit_photons as limit_photons
 from .photon_limit import photon_rates as photon_rates, scope_energies as scope_energies, sense as sense

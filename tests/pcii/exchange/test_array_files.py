@@ -77,7 +77,6 @@ def test_a_folder_of_an_array_for_each_view(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("a.npy", b"version https://git-lfs.github.com/spec/v1\noid", "is a pointer of Git LFS"),
-        ("a.fits", b"SIMPLE  =                    T", "is a FITS file, which is not read"),
         ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(99), "nor in a .npz, .mat or HDF5 file"),
         ("colmap/cameras.bin", b"", "is a model of COLMAP"),
     ],

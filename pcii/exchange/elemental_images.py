@@ -1,4 +1,4 @@
-"""Elemental images from pictures: a file a view, a TIFF file with a page a view, a picture of a lens array.
+"""Elemental images from pictures and arrays: a file a view, a page a view, a picture of a lens array.
 
 A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text. Of
 photon counts {frame} too, if each file holds one frame.
@@ -8,26 +8,30 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from pcii.base import InputError, Report, silent, visible
-from pcii.exchange.pixel_files import Encoding, Picture, decode, kind_of, picture_of, radiance_of
-from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
+from pcii.base import InputError, Report, silent, times, visible
+from pcii.exchange.number_files import VIEWS, Picture, decode, open_array, picture_of
+from pcii.exchange.stated_images import (
+    AS_STORED,
+    Encoding,
+    Note,
+    Optics,
+    ViewOrder,
+    ViewTable,
+    to_radiance,
+    warn,
+)
 from pcii.types import CameraGrid, Truth, Views, mosaic
 
-VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
-"""Kinds of pictures of views."""
-FIELD = re.compile(r"\{(row|col|index|frame)(?::((?:0[1-9])?d?))?\}")
+FIELD = re.compile(r"\{(row|col|index|frame)(?::(?:0[1-9])?d?)?\}")
+LIGHT_TYPES = ("uint8", "uint16", "float16", "float32", "float64")
 MOST_VIEWS = 100_000
 MOST_NAMED = 3
 """Largest number of files that a sentence names."""
-
-
-def is_picture(path: Path) -> bool:
-    """Whether a file begins like a picture of views."""
-    return path.is_file() and kind_of(path) in VIEWS
 
 
 def import_images(
@@ -53,12 +57,56 @@ def import_images(
     """
     path = Path(source)
     if pattern is None:
-        radiance = radiance_of(*pages_of(path, grid, order, note), encoding)
-    else:
-        files = order.arrange(files_by_camera(path, pattern, grid, order, note))
-        if isinstance(files[0, 0], tuple):
-            raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
-        radiance = radiance_of_files(files, encoding, report, note)
+        picture = picture_of_views(path, note)
+        pages = ViewTable(grid=grid, order=order, axes="NHWC")
+        return views_of(pages.by_camera(_radiance_of(picture, encoding), str(path)), optics, cfa)
+    files = order.arrange(files_by_camera(path, pattern, grid, order, note))
+    if files.ndim > 2:
+        raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
+    return views_of(radiance_of_files(files, encoding, report, note), optics, cfa)
+
+
+def import_arrays(
+    source: str | Path | np.ndarray,
+    optics: Optics,
+    *,
+    grid: tuple[int, int] | None = None,
+    order: ViewOrder = AS_STORED,
+    encoding: Encoding | None = None,
+    cfa: str | None = None,
+    axes: str | None = None,
+    key: str | None = None,
+) -> Views:
+    """Radiance of an array (K, L, H, W) or (K, L, H, W, C), C = 1 or 3, or of a file of one.
+
+    With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C); or its `axes` are named, such as "HWKL", N
+    being views. Files are .npy, .npz, .mat and HDF5, of which `key` names one of several arrays. Floats are
+    linear, unless `encoding` says otherwise; whole numbers need it: they may be sRGB of pictures or linear
+    values of a sensor, which the file does not say. `cfa` is a Bayer pattern, of which arrays of one channel
+    are mosaics. Raises `InputError` for what does not fit.
+    """
+    is_array = isinstance(source, np.ndarray)
+    numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
+    views = ViewTable(grid=grid, order=order, axes=axes).by_camera(numbers, name, "H, W[, C]")
+    if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
+        raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
+    if views.ndim == 4:
+        if grid is None and axes is None and views.shape[3] in (3, 4):
+            raise InputError(
+                f"{name}: has the shape {numbers.shape}; give --grid if it is (N, H, W, C), or --axes"
+            )
+        views = views[..., None]
+    if views.ndim != 5 or 0 in views.shape or views.shape[4] not in (1, 3):
+        raise InputError(f"{name}: expected (K, L, H, W) or (K, L, H, W, 1 or 3), got {numbers.shape}")
+    if views.dtype.kind == "u" and encoding is None:
+        raise InputError(
+            f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
+            "--srgb, --linear or --gamma (encoding)"
+        )
+    try:
+        radiance = to_radiance(np.asarray(views), encoding)
+    except InputError as fault:
+        raise InputError(f"{name}: {fault}") from None
     return views_of(radiance, optics, cfa)
 
 
@@ -87,9 +135,9 @@ def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Repo
         if picture.layout() != first[1]:
             raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
         unused.append((path, picture.unused))
-        radiance[camera] = radiance_of(picture, next(decode(picture)), encoding)
+        radiance[camera] = _radiance_of(picture, encoding)[0]
         report("pictures", done, files.size)
-    _tell_unused(unused, note)
+    _note_unused(unused, note)
     return radiance
 
 
@@ -103,96 +151,39 @@ def views_of(radiance: np.ndarray, cameras: Optics | CameraGrid, cfa: str | None
     return Views(radiance, cameras.grid(radiance.shape) if isinstance(cameras, Optics) else cameras, cfa)
 
 
-def pages_of(
-    path: Path, grid: tuple[int, int] | None, order: ViewOrder, note: Note
-) -> tuple[Picture, np.ndarray]:
-    """A picture that has a page for each view, and the pixels (K, L, H, W, C) of its pages.
+def _radiance_of(picture: Picture, encoding: Encoding | None) -> np.ndarray:
+    """Linear radiance (pages, H, W, C), float32, of a picture."""
+    if picture.dtype.name not in LIGHT_TYPES:
+        raise InputError(f"{picture.path}: {picture.dtype} is no type of light; photon counts need --counts")
+    pixels = decode(picture)
+    try:
+        return to_radiance(pixels, encoding, picture.most)
+    except InputError as fault:
+        raise InputError(f"{picture.path}: {fault}") from None
 
-    Pages are counted along the rows of `grid`, by default a square one. Raises `InputError` for another
-    number of pages.
+
+def picture_of_views(path: Path, note: Note, *, has_pages: bool = True) -> Picture:
+    """A picture of all views: with a page for each, or a single one of a lens array.
+
+    `note` takes what else is in the file. Raises `InputError` for the other kind.
     """
     picture = picture_of(path, VIEWS)
-    if picture.pages == 1:
+    if has_pages and picture.pages == 1:
         raise InputError(
             f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
             "folder and --pattern"
         )
-    _tell_unused([(path, picture.unused)], note)
-    pixels = np.stack([*decode(picture)])
-    table = order.table_of(path, picture.pages, grid)
-    return picture, order.arrange(pixels.reshape(*table, *pixels.shape[1:]))
+    if picture.pages > 1 and not has_pages:
+        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
+    _note_unused([(path, picture.unused)], note)
+    return picture
 
 
-def _tell_unused(contents: Sequence[tuple[Path, str]], note: Note) -> None:
+def _note_unused(contents: Sequence[tuple[Path, str]], note: Note) -> None:
     """Name what is not used of the content of files."""
     names = [f"{content} in {path.name}" for path, content in contents if content]
     if names:
         note(f"not used: {listed_names(names)}")
-
-
-def files_by_camera(
-    folder: Path, pattern: str, grid: tuple[int, int] | None, order: ViewOrder, note: Note
-) -> np.ndarray:
-    """Paths (A, B), object, of the files in `folder` that fit the pattern, in the order of their numbers.
-
-    With {frame} each is a tuple of paths, those of the frames of a view.
-    Axes are {row} and {col}; the numbers of {index} count along the table in which the `order` stores a
-    `grid`. Numbers may begin anywhere and have a sign; endings in capitals fit too. Raises `InputError` for a
-    pattern that is none, for files that are missing and for two of one view; `note` takes the names of other
-    files.
-    """
-    expression, names = _expression(pattern)
-    if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder of pictures")
-    files: dict[tuple[int, ...], dict[int, Path]] = {}
-    others: list[str] = []
-    for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
-        name = path.relative_to(folder).as_posix()
-        match = expression.fullmatch(name)
-        if match is None or not path.is_file() or path.name.startswith("."):
-            others += [name] if path.is_file() and not path.name.startswith(".") else []
-            continue
-        view = tuple(int(match[name]) for name in names)
-        frame = int(match["frame"]) if "frame" in expression.groupindex else 0
-        if frame in (of_view := files.setdefault(view, {})):
-            raise InputError(f"{path}: is of the same view as {of_view[frame].name}")
-        of_view[frame] = path
-    if not files:
-        hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
-        raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
-    if others:
-        note(f"not used: {listed_names(others)}, since --pattern does not fit")
-    numbers = np.array([*files])
-    first, last = numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist()
-    size = tuple(end - begin + 1 for begin, end in zip(first, last, strict=True))
-    if math.prod(size) > MOST_VIEWS:
-        raise InputError(f"{folder}: numbers from {first} to {last} are too far apart for a grid of views")
-    if len(names) == 1:
-        size = (max(size[0], math.prod(grid or ())),)
-        table = order.table_of(folder, size[0], grid)
-    else:
-        table = size[0], size[1]
-        stored = grid[::-1] if grid is not None and order.swap_axes else grid
-        if stored not in (None, table):
-            raise InputError(
-                f"{folder}: {pattern} gives {table[0]} rows and {table[1]} columns, not those of --grid"
-            )
-    count = math.prod(table) - len(files)
-    if count:
-        views = (tuple(a + b for a, b in zip(first, step, strict=True)) for step in np.ndindex(*size))
-        view = next(view for view in views if view not in files)
-        numbers_of = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
-        raise InputError(f"{folder}: {count} of {table[0]} x {table[1]} views missing, first {numbers_of}")
-    frames = set().union(*files.values())
-    for view, of_view in files.items():
-        if lacking := frames.difference(of_view):
-            where = ", ".join(f"{name} {number}" for name, number in zip(names, view, strict=True))
-            raise InputError(f"{folder}: frame {min(lacking)} of the view {where} is missing; others have it")
-    paths = np.empty(len(files), dtype=object)
-    for place, view in enumerate(sorted(files)):
-        ordered = tuple(files[view][frame] for frame in sorted(files[view]))
-        paths[place] = ordered if "frame" in expression.groupindex else ordered[0]
-    return paths.reshape(table)
 
 
 def listed_names(names: Sequence[str]) -> str:
@@ -205,24 +196,78 @@ def listed_names(names: Sequence[str]) -> str:
     return visible(", ".join(names[:MOST_NAMED])) + (f" and {more} more" if more > 0 else "")
 
 
-def _expression(pattern: str) -> tuple[re.Pattern[str], tuple[str, ...]]:
-    """The regular expression of file names, and the names of the numbers of a view: row and col, or index."""
-    fields = [match[1] for match in FIELD.finditer(str(pattern))]
-    names = tuple(sorted((name for name in fields if name != "frame"), reverse=True))
-    steps = PurePosixPath(str(pattern)).parts
-    strange = not steps or str(pattern).startswith("/") or ".." in steps or "\0" in str(pattern)
-    strange |= fields.count("frame") > 1
-    if strange or names not in (("index",), ("row", "col")) or {*FIELD.sub("", pattern)} & {*"{}"}:
+def files_by_camera(
+    folder: Path, pattern: str, grid: tuple[int, int] | None, order: ViewOrder, note: Note
+) -> np.ndarray:
+    """Paths (A, B) of the files in `folder` that fit the pattern, in the order of their numbers.
+
+    With {frame} they are (A, B, T), those of the frames of each view. Axes are {row} and {col}; the numbers
+    of {index} count along the table in which the `order` stores a `grid`. Numbers may begin anywhere and have
+    a sign; endings in capitals fit too. Raises `InputError` for a pattern that is none, for files that are
+    missing and for two of one view; `note` takes the names of other files.
+    """
+    expression, fields = _expression(pattern)
+    names = [name for name in fields if name != "frame"]
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder of pictures")
+    files: dict[tuple[int, ...], Path] = {}
+    others: list[str] = []
+    for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
+        if not path.is_file() or path.name.startswith("."):
+            continue
+        name = path.relative_to(folder).as_posix()
+        match = expression.fullmatch(name)
+        if match is None:
+            others.append(name)
+            continue
+        place = tuple(int(match[field]) for field in fields)
+        if place in files:
+            raise InputError(f"{path}: is of the same view as {files[place].name}")
+        files[place] = path
+    if not files:
+        hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
+        raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
+    if others:
+        note(f"not used: {listed_names(others)}, since --pattern does not fit")
+    numbers: list[Sequence[int]] = [sorted({*column}) for column in zip(*files, strict=True)]
+    for axis in range(len(names)):  # whereas frames may be some of many
+        numbers[axis] = range(numbers[axis][0], numbers[axis][-1] + 1)
+    if math.prod(map(len, numbers[: len(names)])) > MOST_VIEWS:
+        ends = " and ".join(f"{name} {r[0]} to {r[-1]}" for name, r in zip(names, numbers, strict=False))
+        raise InputError(f"{folder}: {ends} are too far apart for a grid of views")
+    if names == ["index"]:
+        first, count = numbers[0][0], max(len(numbers[0]), math.prod(grid or ()))
+        numbers[0], table = range(first, first + count), order.table_of(folder, count, grid)
+    else:
+        table = len(numbers[0]), len(numbers[1])
+        if grid is not None and table != (grid[::-1] if order.swap_axes else grid):
+            raise InputError(
+                f"{folder}: {pattern} gives {table[0]} rows and {table[1]} columns, not those of --grid"
+            )
+    missing = [place for place in product(*numbers) if place not in files]
+    if missing:
+        first = ", ".join(f"{name} {number}" for name, number in zip(fields, missing[0], strict=True))
+        size = times([*map(len, numbers)])
+        raise InputError(f"{folder}: {len(missing)} of {size} files missing, first {first}")
+    return np.array([files[place] for place in sorted(files)], object).reshape(
+        *table, *map(len, numbers[len(names) :])
+    )
+
+
+def _expression(pattern: str) -> tuple[re.Pattern[str], list[str]]:
+    """The regular expression of file names, and the numbers in them: row and col, or index; maybe frame."""
+    fields = sorted(FIELD.findall(pattern), key=("row", "col", "index", "frame").index)
+    names = [name for name in fields if name != "frame"]
+    is_known = names in (["index"], ["row", "col"]) and fields.count("frame") < 2
+    if not is_known or {*FIELD.sub("", pattern)} & {*"{}"}:
         raise InputError(
             f'pattern: expected {{row}} and {{col}}, or {{index}}, as in "{{col}}_{{row}}.png" or '
             f'"view{{index:03d}}_*.png"; got {pattern!r}'
         )
-    parts = re.split(r"(\{[^{}]*\}|\*)", pattern)
-    for number, part in enumerate(parts):
-        field = FIELD.fullmatch(part)
-        plain = "[^/]*" if part == "*" else re.escape(part)
-        parts[number] = plain if field is None else f"(?P<{field[1]}>[+-]?[0-9]+)"
-    return re.compile("".join(parts), re.IGNORECASE), names
+    escaped = re.escape(pattern).replace(r"\*", "[^/]*")
+    number = r"(?P<\1>[+-]?[0-9]+)"
+    expression = re.compile(re.sub(r"\\\{([a-z]+).*?\\\}", number, escaped), re.IGNORECASE)
+    return expression, fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,15 +312,14 @@ def import_lens_array(
     is the width of the whole picture. `cfa` is a Bayer pattern, of which a grey picture is a mosaic. Raises
     `InputError` for lenses that are not within the picture, and for a mosaic that cutting or turning breaks.
     """
-    picture = _single_picture(Path(path), note)
+    picture = picture_of_views(Path(path), note, has_pages=False)
     height, width, channels = picture.shape
     optics = replace(optics, pixel_mm=optics.pixel_of(width), sensor_mm=None)
     across = _starts(lenses.cols, lenses.pitch_px[0], lenses.offset_px[0], width, "wide", path)
     down = _starts(lenses.rows, lenses.pitch_px[1], lenses.offset_px[1], height, "high", path)
-    size = math.floor(lenses.pitch_px[1]), math.floor(lenses.pitch_px[0])
     beyond = [
-        int((width - across[-1]) / lenses.pitch_px[0]) - 1,
-        int((height - down[-1]) / lenses.pitch_px[1]) - 1,
+        int((size - starts[-1]) / pitch) - 1
+        for size, starts, pitch in zip((width, height), (across, down), lenses.pitch_px, strict=True)
     ]
     if max(beyond) > 0:
         note(f"not used: room for {beyond[0]} more columns and {beyond[1]} more rows of lens images")
@@ -285,20 +329,12 @@ def import_lens_array(
             f"{path}: is a mosaic, whose pattern lens images break that are turned or do not begin at even "
             "pixels; give the picture in colours"
         )
-    whole = radiance_of(picture, next(decode(picture)), encoding)
-    views = _cut(_cut(whole, down, size[0], 0), across, size[1], 2).swapaxes(1, 2)  # (K, h, L, w, C) before
+    whole = _radiance_of(picture, encoding)[0]
+    rows = _cut(whole, down, math.floor(lenses.pitch_px[1]), 0)
+    views = _cut(rows, across, math.floor(lenses.pitch_px[0]), 2).swapaxes(1, 2)  # (K, h, L, w, C) before
     if lenses.inverted:
         views = views[:, :, ::-1, ::-1]
     return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
-
-
-def _single_picture(path: Path, note: Note) -> Picture:
-    """The picture of a file that holds one; `note` takes what else is in it."""
-    picture = picture_of(path, VIEWS)
-    if picture.pages > 1:
-        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    _tell_unused([(path, picture.unused)], note)
-    return picture
 
 
 def import_interlaced(
@@ -317,7 +353,7 @@ def import_interlaced(
     those of views; `sensor_mm` is the width of the whole picture. Raises `InputError` for a picture of no
     whole number of blocks, and for a mosaic.
     """
-    picture = _single_picture(Path(path), note)
+    picture = picture_of_views(Path(path), note, has_pages=False)
     (height, width, channels), (rows, cols) = picture.shape, interlaced
     if min(rows, cols) < 1 or height % rows or width % cols:
         raise InputError(
@@ -325,8 +361,7 @@ def import_interlaced(
         )
     if cfa is not None and channels == 1:
         raise InputError(f"{path}: is a mosaic, whose pattern interlaced views break; give it in colours")
-    whole = radiance_of(picture, next(decode(picture)), encoding)
-    blocks = whole.reshape(height // rows, rows, width // cols, cols, channels)
+    blocks = _radiance_of(picture, encoding).reshape(height // rows, rows, width // cols, cols, channels)
     return views_of(np.ascontiguousarray(order.arrange(blocks.transpose(1, 3, 0, 2, 4))), optics, cfa)
 
 
