@@ -36,8 +36,6 @@ PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
-FRAMES_AT_ONCE = 255
-"""Their sum fits in a byte."""
 
 
 def import_counts(
@@ -57,17 +55,17 @@ def import_counts(
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
-    An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, an array (N, H, W) or
-    (H, W) in a .npy, .npz, .mat or HDF5 file, in which `key` names it, or has no header (see `FrameFormat`);
-    with {frame} in the pattern it is one frame.
-    For `pattern` and `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array,
-    or a file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
-    (K L, H, W) or (K L, N, H, W); or its `axes` are named, such as "HWKL" or "NTHW", N being views and T
-    frames. Of frames in three channels each pixel keeps the colour of its filter in
-    `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
-    of each single count of frames of one bit is kept, up to 2^24 counts. `note` takes sentences on what is
-    left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
+    An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too. A file
+    of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, an array (N, H, W) or (H, W)
+    in a .npy, .npz, .mat or HDF5 file, in which `key` names it, or has no header (see `FrameFormat`); with
+    {frame} in the pattern it is one frame. For `pattern` and `grid`, and for one TIFF file whose pages are
+    the views, see `import_images`. An array, or a file of one, is (K, L, H, W) or, with N frames,
+    (K, L, N, H, W); with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W); or its `axes` are named, such
+    as "HWKL" or "NTHW", N being views and T frames. Of frames in three channels each pixel keeps the colour
+    of its filter in `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up,
+    from 0. The frame of each single count of frames of one bit is kept, up to 2^24 counts. `note` takes
+    sentences on what is left out or looks wrong. Raises `InputError` for counts that are negative or
+    fractional in any frame.
     """
     stored.check()
     stacks = stacks_of(source, pattern, ViewTable(grid=grid, order=order, axes=axes), key, stored, note)
@@ -145,29 +143,28 @@ class _Sum:
         self.grid, self.frames, self.bits = grid, frames, bits
         most = np.iinfo(np.uint64).max if bits is None else frames * ((1 << bits) - 1)
         self.sums = np.zeros(grid.shape_KLHW, np.min_scalar_type(most))
-        self.singles: list[np.ndarray] | None = [np.empty((0, 5), np.int32)]
+        self.singles = [np.empty((0, 5), np.int32)]
         self.number, self.is_above_one = 0, False
 
     def add(self, camera: tuple[int, ...], first: int, counts: np.ndarray) -> None:
         """Add frames (T, H, W) of a camera, from the frame number `first` on."""
-        self.is_above_one |= self.bits != 1 and bool(counts.max(initial=0) > 1)
-        if self.is_above_one:
-            self.singles = None
-            self.sums[camera] += counts.sum(axis=0, dtype=np.uint64).astype(self.sums.dtype)
+        self.sums[camera] += counts.sum(axis=0, dtype=self.sums.dtype)
+        self.is_above_one |= bool(counts.max(initial=0) > 1)
+        self.number += int(np.count_nonzero(counts))
+        if self.is_above_one or self.number > MOST_KEPT:
+            self.singles.clear()
             return
-        bits = counts.astype(np.uint8, copy=False)
-        for low in range(0, len(bits), FRAMES_AT_ONCE):
-            self.sums[camera] += np.add.reduce(bits[low : low + FRAMES_AT_ONCE], axis=0, dtype=np.uint8)
-        self.number += int(np.count_nonzero(bits))
-        if self.singles is not None and self.number <= MOST_KEPT:
-            frame, i, j = np.nonzero(bits)
-            k, l = (np.full(frame.size, index) for index in camera)
-            self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
+        frame, i, j = np.nonzero(counts)
+        k, l = (np.full(frame.size, index) for index in camera)
+        self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
 
     def photon_counts(self, cfa: str | None, name: str, note: Note) -> PhotonCounts:
         """The counts; of numbers 0 and 1 alone in light that would give others as frames of one bit."""
         if self.bits is None and not self.is_above_one:
-            expected = _expected_above_one(self.number, self.sums.size * self.frames)
+            samples = self.sums.size * self.frames
+            dark = 1 - self.number / samples
+            # Poisson counts of the same light would have at least so many numbers above 1.
+            expected = samples * (1 - dark * (1 - np.log(dark)) if dark > 0 else 1.0)
             if expected > SURE_NATS:
                 note(
                     f"{name} is taken for frames of one bit: no pixel of a frame counts more than 1, where "
@@ -175,17 +172,16 @@ class _Sum:
                 )
                 self.bits = 1
         options = {"cfa": cfa, "frames": self.frames, "bits": self.bits}
-        if self.bits != 1:
-            return PhotonCounts.from_dense(self.sums, self.grid, **options)
-        if self.singles is None or self.number > MOST_KEPT:
+        if self.bits == 1 and self.number <= MOST_KEPT:
+            k, l, i, j, frame = np.concatenate(self.singles).T
+            n = np.ones(k.size, np.uint8)
+            return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
+        if self.bits == 1:
             note(
                 f"only the sums of {self.frames} frames are kept: there are {self.number} counts, and the "
                 f"frame of each is kept for up to {MOST_KEPT}"
             )
-            return PhotonCounts.from_dense(self.sums, self.grid, **options)
-        k, l, i, j, frame = np.concatenate(self.singles).T
-        n = np.ones(k.size, np.uint8)
-        return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
+        return PhotonCounts.from_dense(self.sums, self.grid, **options)
 
 
 def _warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: Note) -> None:
@@ -244,8 +240,7 @@ def _warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, note:
     """Warn if views (K, L, H, W) are smoother where the bits of each byte are turned round.
 
     Steps between neighbours of one colour at the ends of bytes are compared in both orders: what stands there
-    side by side is, in the wrong order, 15 pixels apart. Views and rows
-    show how far that is by chance.
+    side by side is, in the wrong order, 15 pixels apart. Views and rows show how far that is by chance.
     """
     apart, width = (1 if cfa is None else 2), sums.shape[3] // 8 * 8
     if width < 16:
@@ -265,10 +260,3 @@ def _warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, note:
             "warning: neighbours in two bytes differ as if the bits of each byte were in the other order; if "
             f"so, import again with --bit-order {other}"
         )
-
-
-def _expected_above_one(counts: int, samples: int) -> float:
-    """How many of `samples` numbers, of which `counts` are 1 and no other is above 0, Poisson counts of the
-    same light would have above 1, at least."""
-    dark = 1 - counts / samples
-    return samples * (1 - dark * (1 - np.log(dark)) if dark > 0 else 1.0)

@@ -22,8 +22,8 @@ def test_frames_in_any_order_of_a_rig_anywhere_are_put_in_their_places(tmp_path:
     mixed = [frames[n] for n in np.random.default_rng(1).permutation(len(frames))]
     file = read(tmp_path, mixed)
     found = find_grid(file)
-    names = [[file.frame_name(n) for n in row] for row in found.numbers]
-    assert names == [[f"images/{k}_{l}.png" for l in range(cols)] for k in range(rows)]
+    names = [[path.name for path in row] for row in found.files]
+    assert names == [[f"{k}_{l}.png" for l in range(cols)] for k in range(rows)]
     # Decimals come back as they were; an axis with one camera has the pitch of the other.
     across, down = (5.0 if cols > 1 else None), (3.7 if rows > 1 else None)
     assert found.pitch_mm == (across or down or 1.0, down or across or 1.0)
