@@ -6,7 +6,7 @@ several options, which a dataclass lists. An option that the reader of a source 
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -110,14 +110,6 @@ READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
     import_posed_cubes: ("photon cubes with a transforms.json", ("counts",)),
 }
 """What a reader reads, and the flags that it meets by its nature."""
-GROUPS: dict[str, type[Any]] = {
-    "optics": Cameras,
-    "order": ViewOrder,
-    "lenses": Lenses,
-    "encoding": PictureLight,
-    "stored": FrameFormat,
-}
-"""Parameters of readers that stand for the options of a group."""
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 
@@ -198,15 +190,16 @@ def import_dataset(
         raise InputError("--seed: is for --photons N, which draws photon counts")
     options: dict[str, Any] = {"pattern": pattern, "grid": grid, "axes": axes, "key": key, "counts": counts}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
-    for group in (cameras, order, lenses, light, stored):
+    groups = {"optics": cameras, "order": order, "lenses": lenses, "encoding": light, "stored": stored}
+    for group in groups.values():
         options |= vars(group)
     options["frames"] = frames
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
         reader = _choose_reader(source, options)
-        values = {"order": order, "stored": stored, "report": report, "note": notes.append}
-        arguments = _arguments(reader, source, options | values)
+        listeners = {"report": report, "note": notes.append}
+        arguments = _arguments(reader, source, options, groups, listeners)
         result = reader(source, **arguments)
         known = result if isinstance(result, KnownViews) else None
         read = result.views if isinstance(result, KnownViews) else result
@@ -295,28 +288,34 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
     return import_images if is_folder or kind_of(source) in VIEWS else import_arrays
 
 
-def _arguments(reader: Callable[..., Any], source: Path, values: Mapping[str, Any]) -> dict[str, Any]:
+def _arguments(
+    reader: Callable[..., Any],
+    source: Path,
+    options: Mapping[str, Any],
+    groups: Mapping[str, Any],
+    listeners: Mapping[str, Any],
+) -> dict[str, Any]:
     """The arguments of a reader, from the values of all options, None or False where they were not given.
 
-    Raises `InputError` for an option that does not go with the source.
+    `groups` are the parameters of readers that stand for several options. Raises `InputError` for an option
+    that does not go with the source.
     """
     what, flags = READERS[reader]
-    parameters = [*inspect.signature(reader).parameters][1:]
-    accepted = {*parameters, *flags, *GROUPS, "report", "note"}
-    for name in GROUPS.keys() & {*parameters}:
-        accepted |= {field.name for field in fields(GROUPS[name])}
-    names = [name for name, value in values.items() if value is not None and value is not False]
+    parameters = {*inspect.signature(reader).parameters}
+    accepted = parameters.union(flags, *(vars(groups[name]) for name in groups.keys() & parameters))
+    names = [name for name, value in options.items() if value is not None and value is not False]
     others = ", ".join(f"--{name.replace('_', '-')}" for name in names if name not in accepted)
     if others:
         raise InputError(f"{others}: not for {source}, which is read as {what}")
-    groups = {"lenses": _lens_array, "optics": _optics, "encoding": _encoding}
-    return {name: groups[name](values) if name in groups else values[name] for name in parameters}
+    made = {"lenses": _lens_array, "optics": _optics, "encoding": _encoding}
+    values = {**options, **groups, **listeners}
+    values |= {name: make(options) for name, make in made.items() if name in parameters}
+    return {name: value for name, value in values.items() if name in parameters}
 
 
 def _optics(options: Mapping[str, Any]) -> Optics:
     """The cameras' optics; `InputError` if a length is missing."""
-    lengths = {field.name: options[field.name] for field in fields(Cameras)}
-    lengths = {name: value for name, value in lengths.items() if value is not None}
+    lengths = {name: options[name] for name in vars(CAMERAS) if options[name] is not None}
     if options["lens_pitch_px"] is not None and "pixel_mm" in lengths:
         x, y = options["lens_pitch_px"]
         lengths.setdefault("pitch_mm", (x * lengths["pixel_mm"], y * lengths["pixel_mm"]))
@@ -368,11 +367,10 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
         changes = {n: value for n, value in vars(fit.order).items() if value != getattr(order, n)}
         if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
             changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
-        flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}
         words = [
             f"{word} --{' --'.join(names).replace('_', '-')}"
-            for word, names in (("with", flags[True]), ("without", flags[False]))
-            if names
+            for word, is_set in (("with", True), ("without", False))
+            if (names := [name for name, value in changes.items() if value is is_set])
         ]
         better = f"the views fit together far better {' and '.join(words)}"
         if changes.keys() == {"flip_cols"} and fit.shear_px is not None:

@@ -48,12 +48,11 @@ class DepthFile:
             raise InputError(f"--depth-unit-mm: expected a length above 0, got {self.depth_unit_mm:g}")
         path = Path(self.depth)
         numbers = _numbers_in(path, self.depth_key)
-        if numbers.shape != grid.shape_HW:
+        if numbers.shape != grid.shape_HW or numbers.dtype.kind not in "iuf":
             raise InputError(
-                f"--depth: {path} is {numbers.shape}, and views are {grid.shape_HW}, rows x columns"
+                f"--depth: {path} is {numbers.dtype} {numbers.shape}; expected real numbers {grid.shape_HW}, "
+                "rows x columns of a view"
             )
-        if numbers.dtype.kind not in "iuf":
-            raise InputError(f"--depth: {path} holds {numbers.dtype}; expected real numbers")
         is_unknown = np.isnan(numbers) | (numbers == 0)
         if numbers.dtype.kind in "iu":
             is_unknown |= numbers == np.iinfo(numbers.dtype).max
@@ -69,22 +68,14 @@ class DepthFile:
             )
         hit = z_mm[np.isfinite(z_mm)]
         reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
-        if hit.size and hit.max() < grid.focal_mm:
-            note(
-                f"warning: {path.name} has depths of {reach}, nearer than the focal length of "
-                f"{grid.focal_mm:g} mm; if they are in metres, import again with --depth-unit-mm 1000"
-            )
         note(f"with the true depth of the virtual centre, {reach}, from {path.name}")
-        if is_unknown.any():
-            count = np.count_nonzero(is_unknown)
+        count = np.count_nonzero(is_unknown)
+        if count:
             note(f"{count} of {z_mm.size} pixels have no known depth there, and count in no score")
-        return Truth(
-            z_mm.astype(np.float32),
-            np.where(is_unknown, UNKNOWN, 0).astype(np.int16),
-            {UNKNOWN: "unknown depth"} if is_unknown.any() else {},
-            unscored=frozenset({UNKNOWN} if is_unknown.any() else ()),
-            are_objects_known=False,
-        )
+        names = {UNKNOWN: "unknown depth"} if count else {}
+        object_id = np.where(is_unknown, UNKNOWN, 0).astype(np.int16)
+        z_mm = z_mm.astype(np.float32)
+        return Truth(z_mm, object_id, names, unscored=frozenset(names), are_objects_known=False)
 
 
 NO_DEPTH = DepthFile()
