@@ -257,11 +257,8 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
         raise InputError(f"{source}: there is no such file or folder")
     pattern, is_folder = options["pattern"], source.is_dir()
     if options["lens_array"] is not None:
-        if is_folder:
-            raise InputError(
-                f"{source}: is a folder; --lens-array is for one picture, which holds all lens images"
-            )
-    elif pattern is None:
+        return import_lens_array
+    if pattern is None:
         if transforms_in(source) is not None:
             has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
             return import_posed_cubes if has_cubes else import_posed_pictures
@@ -277,15 +274,11 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
             raise InputError(
                 f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"'
             )
-    if pattern is not None and not is_folder:
-        raise InputError(f"{source}: --pattern is for a folder, and this is a file")
-    if options["lens_array"] is not None:
-        return import_lens_array
     if options["interlaced"] is not None:
         return import_interlaced
     if any(options[name] for name in ("counts", "bits", "bitpack", "frame_size")):
         return import_counts
-    return import_images if is_folder or kind_of(source) in VIEWS else import_arrays
+    return import_images if pattern is not None or kind_of(source) in VIEWS else import_arrays
 
 
 def _arguments(

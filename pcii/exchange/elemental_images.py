@@ -124,7 +124,8 @@ def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Repo
 
     `note` takes what else is in them. Raises `InputError`, naming the file, if one differs.
     """
-    radiance, first, unused = np.empty(0), None, []
+    radiance, first = np.empty(0), None
+    unused: list[str] = []
     for done, (camera, path) in enumerate(np.ndenumerate(files), start=1):
         picture = picture_of(path, VIEWS)
         if picture.pages > 1:
@@ -134,10 +135,11 @@ def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Repo
             radiance = np.empty((*files.shape, *picture.shape), np.float32)
         if picture.layout() != first[1]:
             raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
-        unused.append((path, picture.unused))
+        unused += [f"{picture.unused} in {path.name}"] if picture.unused else []
         radiance[camera] = _radiance_of(picture, encoding)[0]
         report("pictures", done, files.size)
-    _note_unused(unused, note)
+    if unused:
+        note(f"not used: {listed_names(unused)}")
     return radiance
 
 
@@ -175,15 +177,9 @@ def picture_of_views(path: Path, note: Note, *, has_pages: bool = True) -> Pictu
         )
     if picture.pages > 1 and not has_pages:
         raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    _note_unused([(path, picture.unused)], note)
+    if picture.unused:
+        note(f"not used: {picture.unused} in {path.name}")
     return picture
-
-
-def _note_unused(contents: Sequence[tuple[Path, str]], note: Note) -> None:
-    """Name what is not used of the content of files."""
-    names = [f"{content} in {path.name}" for path, content in contents if content]
-    if names:
-        note(f"not used: {listed_names(names)}")
 
 
 def listed_names(names: Sequence[str]) -> str:
@@ -209,7 +205,7 @@ def files_by_camera(
     expression, fields = _expression(pattern)
     names = [name for name in fields if name != "frame"]
     if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder of pictures")
+        raise InputError(f"{folder}: there is no such folder; --pattern names the files of a folder")
     files: dict[tuple[int, ...], Path] = {}
     others: list[str] = []
     for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):

@@ -18,7 +18,7 @@ from pcii.base import InputError, Report, Stages, json_bytes, named_in_errors, n
 from pcii.exchange.hci_scenes import write_hci
 from pcii.exchange.posed_exports import write_nerfstudio, write_photon_cubes
 from pcii.store import COLUMNS, Collection, Dataset, check_free, is_collection, open_collection, open_dataset
-from pcii.types import OPTIONAL_MAPS, Light, Truth
+from pcii.types import OPTIONAL_MAPS, Light
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events", "webdataset"]
 SHARD_BYTES = 1 << 28
@@ -78,10 +78,6 @@ def export_dataset(
     return folder
 
 
-def _write_events(dataset: Dataset, folder: Path) -> None:
-    (folder / "events.npz").write_bytes(_events_of(dataset))
-
-
 def _events_of(dataset: Dataset) -> bytes:
     """Photons, cameras and truth as a NumPy archive, whose arrays need no pickle.
 
@@ -100,8 +96,14 @@ def _events_of(dataset: Dataset) -> bytes:
     for name in ("z_mm", "z_range_mm"):
         values[f"analysis_{name}"] = dataset.analysis.get(name) or None
     values["photon_budget"] = dataset.light.photons
-    if dataset.truth is not None:
-        values |= _truth_arrays(dataset.truth)
+    truth = dataset.truth
+    if truth is not None:
+        values |= {f"truth_{name}": getattr(truth, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
+        values["object_keys"] = np.array(list(truth.names), dtype=np.int64)
+        values["object_names"] = np.array(list(truth.names.values()), dtype=np.str_)
+        if truth.photons is not None:
+            values["photon_object_id"] = truth.photons.object_id
+            values["photon_z_mm"] = truth.photons.z_mm
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)
@@ -133,21 +135,11 @@ def _write_shards(
         report("datasets", done, len(collection))
 
 
-def _truth_arrays(truth: Truth) -> dict[str, np.ndarray | None]:
-    arrays = {f"truth_{name}": getattr(truth, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
-    arrays["object_keys"] = np.array(list(truth.names), dtype=np.int64)
-    arrays["object_names"] = np.array(list(truth.names.values()), dtype=np.str_)
-    if truth.photons is not None:
-        arrays["photon_object_id"] = truth.photons.object_id
-        arrays["photon_z_mm"] = truth.photons.z_mm
-    return arrays
-
-
-WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
+WRITERS: dict[Format, Callable[[Dataset, Path], object]] = {
     "hci": write_hci,
     "nerfstudio": write_nerfstudio,
     "photoncube": write_photon_cubes,
-    "events": _write_events,
+    "events": lambda dataset, folder: (folder / "events.npz").write_bytes(_events_of(dataset)),
 }
 
 

@@ -12,7 +12,6 @@ p = sensor size / longer side of the image. The views of a grid with the shear s
 """
 
 import configparser
-import io
 import math
 import re
 from collections.abc import Callable
@@ -169,9 +168,18 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
     def disparity_px(z_mm: np.ndarray) -> np.ndarray:
         return baseline_mm * grid.focal_mm / (z_mm.astype(np.float64) * grid.pixel_mm) - shear_px
 
-    for suffix, z_mm in _depth_maps_mm(dataset, names).items():
-        _write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
-        _write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
+    maps: dict[str, np.ndarray] = {}
+    if not dataset.has_truth_array("camera_position_mm"):  # errors of calibration, which the layout has not
+        if dataset.has_truth_array("view_z_mm"):
+            view_z_mm = dataset.truth_array("view_z_mm")
+            maps = {f"_{name}": view_z_mm[camera] for camera, name in names.items()}
+        if dataset.truth is not None and grid.rows % 2 and grid.cols % 2:
+            maps[""] = dataset.truth.z_mm
+    for suffix, z_mm in maps.items():
+        for kind, values in (("depth", z_mm / 1000), ("disp", disparity_px(z_mm))):
+            # Debevec's PFM: rows from the bottom to the top, the scale -1 for little endian.
+            content = f"Pf\n{grid.width} {grid.height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes()
+            (folder / f"gt_{kind}_lowres{suffix}.pfm").write_bytes(content)
     (folder / PARAMETERS).write_text(_parameters(dataset, baseline_mm, shear_px, disparity_px))
     (folder / README).write_text(
         f"{visible(dataset.name)}: {grid.rows} x {grid.cols} integral images, row by row from the top left.\n"
@@ -192,19 +200,6 @@ def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> flo
     return (values or pair)[0]
 
 
-def _depth_maps_mm(dataset: Dataset, names: dict[tuple[int, int], str]) -> dict[str, np.ndarray]:
-    """Maps of depth (H, W) by the suffix of their files; none of cameras that have errors of calibration."""
-    maps: dict[str, np.ndarray] = {}
-    if dataset.has_truth_array("camera_position_mm"):
-        return maps
-    if dataset.has_truth_array("view_z_mm"):
-        z_mm = dataset.truth_array("view_z_mm")
-        maps = {f"_{name}": z_mm[camera] for camera, name in names.items()}
-    if dataset.truth is not None and dataset.grid.rows % 2 and dataset.grid.cols % 2:
-        maps[""] = dataset.truth.z_mm
-    return maps
-
-
 def _parameters(
     dataset: Dataset, baseline_mm: float, shear_px: float, disparity_px: Callable[[np.ndarray], np.ndarray]
 ) -> str:
@@ -213,48 +208,43 @@ def _parameters(
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
     lens = recipe.get("grid", {}).get("lens")
     lowest, highest = _range_px(dataset, disparity_px)
-    values = {
-        "intrinsics": {
-            "focal_length_mm": grid.focal_mm,
-            "image_resolution_x_px": grid.width,
-            "image_resolution_y_px": grid.height,
-            "sensor_size_mm": grid.pixel_mm * max(grid.width, grid.height),
-            "fstop": grid.focal_mm / lens["aperture_mm"] if lens else math.inf,
-        },
-        "extrinsics": {
-            "num_cams_x": grid.cols,
-            "num_cams_y": grid.rows,
-            "baseline_mm": baseline_mm,
-            "focus_distance_m": focus_m,
-            "center_cam_x_m": 0.0,
-            "center_cam_y_m": 0.0,
-            "center_cam_z_m": 0.0,
-            # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down.
-            "center_cam_rx_rad": math.pi,
-            "center_cam_ry_rad": 0.0,
-            "center_cam_rz_rad": 0.0,
-            "offset": shear_px,
-        },
-        "meta": {
-            "scene": re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name),
-            "category": "additional",
-            "date": "",
-            "version": "",
-            "authors": "",
-            "contact": "",
-            "cycles_seed": recipe.get("seed") or 0,
-            "disp_min": lowest,
-            "disp_max": highest,
-            "frustum_disp_min": lowest,
-            "frustum_disp_max": highest,
-            "depth_map_scale": 1.0,
-        },
-    }
-    parser = configparser.ConfigParser(delimiters="=", interpolation=None)
-    parser.read_dict(values)
-    text = io.StringIO()
-    parser.write(text)
-    return text.getvalue()
+    scene = re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name)
+    # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down: turned by pi about X.
+    return f"""[intrinsics]
+focal_length_mm = {grid.focal_mm}
+image_resolution_x_px = {grid.width}
+image_resolution_y_px = {grid.height}
+sensor_size_mm = {grid.pixel_mm * max(grid.width, grid.height)}
+fstop = {grid.focal_mm / lens["aperture_mm"] if lens else math.inf}
+
+[extrinsics]
+num_cams_x = {grid.cols}
+num_cams_y = {grid.rows}
+baseline_mm = {baseline_mm}
+focus_distance_m = {focus_m}
+center_cam_x_m = 0.0
+center_cam_y_m = 0.0
+center_cam_z_m = 0.0
+center_cam_rx_rad = {math.pi}
+center_cam_ry_rad = 0.0
+center_cam_rz_rad = 0.0
+offset = {shear_px}
+
+[meta]
+scene = {scene}
+category = additional
+date = {""}
+version = {""}
+authors = {""}
+contact = {""}
+cycles_seed = {recipe.get("seed") or 0}
+disp_min = {lowest}
+disp_max = {highest}
+frustum_disp_min = {lowest}
+frustum_disp_max = {highest}
+depth_map_scale = 1.0
+
+"""
 
 
 def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
@@ -267,13 +257,3 @@ def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]
         return math.nan, math.nan
     disparities = disparity_px(np.asarray(depths_mm))
     return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
-
-
-def _write_pfm(path: Path, values: np.ndarray) -> None:
-    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
-
-    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
-    """
-    height, width = values.shape
-    header = f"Pf\n{width} {height}\n-1\n".encode()
-    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

@@ -4,7 +4,7 @@ The frames of a transforms.json may be in any order and the rig anywhere in the 
 those of the pictures.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,21 +32,6 @@ USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseGrid:
-    """Which file is of which camera, and what poses and principal points say of the grid.
-
-    An axis with one camera has the pitch of the other; a single camera has 1 mm.
-    """
-
-    files: np.ndarray
-    """File of the frame that is camera (k, l), (K, L) of `Path`: rows from the top, columns from the left."""
-    pitch_mm: tuple[float, float]
-    shear_px: tuple[float, float]
-    offset_px: tuple[float, float]
-    """By how much further right and down than the film's middle the axes meet it, of all cameras alike."""
-
-
 def import_posed_pictures(
     source: str | Path,
     *,
@@ -65,12 +50,11 @@ def import_posed_pictures(
     and member, frame or picture, for what is missing, wrong, or no such grid.
     """
     file = read_transforms(source, note=note)
-    poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
-    radiance = radiance_of_files(poses.files, encoding, report, note)
+    grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
+    radiance = radiance_of_files(files, encoding, report, note)
     if radiance.shape[2:4] != grid.shape_HW:
         raise InputError(
-            f"{poses.files[0, 0]}: is {times(radiance.shape[2:4])} px, where {file.path.name} says "
+            f"{files[0, 0]}: is {times(radiance.shape[2:4])} px, where {file.path.name} says "
             f"{times(grid.shape_HW)}, rows x columns"
         )
     return views_of(radiance, grid, cfa)
@@ -98,68 +82,29 @@ def import_posed_cubes(
     file = read_transforms(source, note=note)
     if file.cfa is not None and cfa not in (None, file.cfa):
         raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
-    poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
-    first = open_array(poses.files[0, 0])
+    grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
+    first = open_array(files[0, 0])
     channels = first.shape[3] if first.ndim == 4 else 1
     if file.channels not in (None, channels):
-        raise InputError(
-            f"{file.path}: c: is {file.channels}, and {poses.files[0, 0]} has {channels} channels"
-        )
+        raise InputError(f"{file.path}: c: is {file.channels}, and {files[0, 0]} has {channels} channels")
     if stored.bitpack or file.is_bitpacked:
         stored = replace(stored, bitpack=True, width=grid.width)
     options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "note": note}
-    return import_counts(poses.files, grid, stored=stored, **options)
+    return import_counts(files, grid, stored=stored, **options)
 
 
-def camera_grid_of(
+def find_grid(
     file: TransformsFile,
-    poses: PoseGrid,
-    focal_mm: float | None,
-    pixel_mm: float | None,
-    sensor_mm: float | None,
+    focal_mm: float | None = None,
+    pixel_mm: float | None = None,
+    sensor_mm: float | None = None,
     note: Note = warn,
-) -> CameraGrid:
-    """The camera grid in mm: poses give pitch and shear, one length of the film the others.
+) -> tuple[CameraGrid, np.ndarray]:
+    """The grid of the frames of a file, in whichever order they are, and the file of each camera, (K, L).
 
-    Raises `InputError` for more than one length of the film.
-    """
-    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
-    if missing < 2:
-        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
-    if focal_mm is not None:
-        pixel_mm = focal_mm / file.focal_px
-    else:
-        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
-        focal_mm = _digits(file.focal_px * pixel_mm)
-    if missing == 3:
-        note(
-            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
-            "its ratio, and nothing else of them matters"
-        )
-    if any(poses.offset_px):
-        x, y = poses.offset_px
-        note(
-            f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
-            "below it, alike in all: sections and depth are in the frame of the pictures"
-        )
-    rows, cols = poses.files.shape
-    return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=poses.pitch_mm,
-        focal_mm=focal_mm,
-        pixel_mm=pixel_mm,
-        height=file.height,
-        width=file.width,
-        shear_px=poses.shear_px,
-    )
-
-
-def find_grid(file: TransformsFile) -> PoseGrid:
-    """The grid of the frames of a file, in whichever order they are, fitted by least squares.
-
-    Raises `InputError` for cameras that are no such grid, with the frame that is off most.
+    Pitch and shear are fitted by least squares; an axis with one camera has the pitch of the other, a single
+    camera has 1 mm. One length of the film gives the others. Raises `InputError` for more than one, and for
+    cameras that are no such grid, with the frame that is off most.
     """
     from scipy.spatial import KDTree
 
@@ -190,12 +135,36 @@ def find_grid(file: TransformsFile) -> PoseGrid:
     _check_moved(file, moved_px, np.linalg.norm(off[:3], axis=0), "mm from its place in a plane grid")
     off_px = np.hypot(off[3], off[4])
     _check_moved(file, off_px, off_px, "px from where cx and cy of a grid with one shear would be")
-    return PoseGrid(
-        np.array(file.file_paths, object)[numbers],
+    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
+    if missing < 2:
+        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
+    if focal_mm is not None:
+        pixel_mm = focal_mm / file.focal_px
+    else:
+        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
+        focal_mm = _digits(file.focal_px * pixel_mm)
+    if missing == 3:
+        note(
+            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
+            "its ratio, and nothing else of them matters"
+        )
+    x, y = _digits(means[3]), _digits(means[4])
+    if x or y:
+        note(
+            f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
+            "below it, alike in all: sections and depth are in the frame of the pictures"
+        )
+    grid = CameraGrid(
+        rows=int(rows),
+        cols=int(cols),
         pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
+        focal_mm=focal_mm,
+        pixel_mm=pixel_mm,
+        height=file.height,
+        width=file.width,
         shear_px=(_digits(slopes[3]), _digits(slopes[4])),
-        offset_px=(_digits(means[3]), _digits(means[4])),
     )
+    return grid, np.array(file.file_paths, object)[numbers]
 
 
 def _places_in_common_frame(file: TransformsFile) -> np.ndarray:

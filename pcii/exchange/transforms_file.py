@@ -8,6 +8,7 @@ Y up, looking along -Z, in metres.
 
 import json
 import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
@@ -118,7 +119,13 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     are not packed along the width, and a single cube whose camera moves.
     """
     file = transforms_in(Path(path)) or Path(path)
-    document = _parsed(file)
+    content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
+    try:
+        document = _Document.model_validate(json.loads(content))
+    except ValidationError as fault:
+        raise InputError(f"{file}: {first_fault(fault)}") from None
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
     frames, is_single_cube = document.frames, document.file_path is not None
     paths = _paths(file, document)
     has_cubes = is_single_cube or document.bitpack is True or any(path.suffix == ".npy" for path in paths)
@@ -158,39 +165,30 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     )
 
 
-def _parsed(file: Path) -> _Document:
-    """The document of a file; `InputError` with the first member that is wrong."""
-    content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
-    try:
-        return _Document.model_validate(json.loads(content))
-    except ValidationError as fault:
-        raise InputError(f"{file}: {first_fault(fault)}") from None
-    except (ValueError, RecursionError) as fault:
-        raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
-
-
 def _paths(file: Path, document: _Document) -> tuple[Path, ...]:
-    """The picture or cube of each frame, or that of a single camera; `InputError` for one of two frames."""
-    if document.file_path is not None:
-        return (_path(file, "file_path", document.file_path),)
-    frames = enumerate(document.frames)
-    paths = tuple(_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in frames)
-    if len({*paths}) < len(paths):
-        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
-        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
-    return paths
+    """The picture or cube of each frame, or that of a single camera; without its ending if that is found.
 
-
-def _path(file: Path, member: str, text: str | None) -> Path:
-    """The file that a member names, in the folder; without its ending if that is found."""
-    inside = PurePosixPath((text or "").replace("\\", "/"))
-    folder = file.parent.resolve()
-    is_plain = bool(inside.parts) and not inside.is_absolute() and ".." not in inside.parts
-    if not is_plain or not (folder / inside).resolve().is_relative_to(folder):
-        raise InputError(f"{file}: {member}: expected a path inside the folder such as images/00_00.png")
-    path = file.parent / inside
-    endings = (path.with_name(path.name + ending) for ending in ENDINGS)
-    return path if path.exists() else next((other for other in endings if other.is_file()), path)
+    Raises `InputError` for a path that leads out of the folder, and for one of two frames.
+    """
+    members = {"file_path": document.file_path}
+    if document.file_path is None:
+        members = {f"frames.{n}.file_path": frame.file_path for n, frame in enumerate(document.frames)}
+    folder, paths = file.parent.resolve(), []
+    for member, text in members.items():
+        inside = PurePosixPath((text or "").replace("\\", "/"))
+        is_plain = bool(inside.parts) and not inside.is_absolute()
+        if not is_plain or not (folder / inside).resolve().is_relative_to(folder):
+            raise InputError(f"{file}: {member}: expected a path inside the folder such as images/00_00.png")
+        path = file.parent / inside
+        if not path.exists():
+            endings = (path.with_name(path.name + ending) for ending in ENDINGS)
+            path = next((other for other in endings if other.is_file()), path)
+        paths.append(path)
+    (path, count), *_ = Counter(paths).most_common(1)
+    if count > 1:
+        name = path.relative_to(file.parent).as_posix()
+        raise InputError(f"{file}: frames: {name} is the file_path of {count} of them")
+    return tuple(paths)
 
 
 def _common_lens(file: Path, document: _Document) -> tuple[tuple[int, int, float], np.ndarray]:

@@ -1,4 +1,3 @@
-# ruff: noqa: E501
 """Photon cubes and frames of strangers come in, and what is wrong is one sentence."""
 
 import json
