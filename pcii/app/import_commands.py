@@ -21,6 +21,7 @@ from pcii.exchange import (
     AS_COUNTED,
     NO_DEPTH,
     PARAMETERS,
+    TRANSFORMS,
     VIEWS,
     DepthFile,
     Encoding,
@@ -40,7 +41,6 @@ from pcii.exchange import (
     import_posed_pictures,
     kind_of,
     read_transforms,
-    transforms_in,
 )
 from pcii.sections import warn_of_saturation
 from pcii.store import check_free, save_dataset
@@ -259,7 +259,7 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
     if options["lens_array"] is not None:
         return import_lens_array
     if pattern is None:
-        if transforms_in(source) is not None:
+        if source.suffix == ".json" or (source / TRANSFORMS).is_file():
             has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
             return import_posed_cubes if has_cubes else import_posed_pictures
         if (source / PARAMETERS).is_file():

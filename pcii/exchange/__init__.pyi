@@ -8,10 +8,9 @@ from .frame_files import AS_COUNTED as AS_COUNTED, FrameFormat as FrameFormat
 from .hci_scenes import PARAMETERS as PARAMETERS, import_hci as import_hci
 from .number_files import UPRIGHT as UPRIGHT, VIEWS as VIEWS, decode as decode, kind_of as kind_of
 from .number_files import open_array as open_array, picture_of as picture_of
-from .posed_exports import write_png as write_png
+from .posed_exports import TRANSFORMS as TRANSFORMS, write_png as write_png
 from .posed_views import find_grid as find_grid, import_posed_cubes as import_posed_cubes
 from .posed_views import import_posed_pictures as import_posed_pictures
 from .stated_images import AS_STORED as AS_STORED, Encoding as Encoding, Note as Note, Optics as Optics
 from .stated_images import ViewOrder as ViewOrder
 from .transforms_file import TransformsFile as TransformsFile, read_transforms as read_transforms
-from .transforms_file import transforms_in as transforms_in

@@ -35,9 +35,9 @@ MOST_NAMED = 3
 
 
 def import_images(
-    source: str | Path,
+    source: str | Path | np.ndarray,
     pattern: str | None,
-    optics: Optics,
+    optics: Optics | CameraGrid,
     *,
     grid: tuple[int, int] | None = None,
     order: ViewOrder = AS_STORED,
@@ -49,21 +49,43 @@ def import_images(
     """Radiance of the pictures of a folder whose names fit a pattern such as "{col}_{row}.png".
 
     Names hold {row} and {col}, or {index}, which counts along the rows of cameras of a `grid` (K, L); without
-    `grid` it is square. Without a pattern `source` is a TIFF file, whose pages are counted like {index}.
-    Pictures are PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one kind.
-    Whole numbers are sRGB and floats are linear, unless `encoding` says otherwise. `cfa` is a Bayer pattern,
-    of which grey pictures are mosaics. `note` takes the names of files that do not fit the pattern. Raises
-    `InputError`, naming a file, for what does not fit.
+    `grid` it is square. Without a pattern `source` is a TIFF file, whose pages are counted like {index}. An
+    array (K, L) of `Path` names the file of each view; a `CameraGrid` states the size of views too. Pictures
+    are PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one kind. Whole numbers
+    are sRGB and floats are linear, unless `encoding` says otherwise. `cfa` is a Bayer pattern, of which grey
+    pictures are mosaics. `note` takes the names of files that do not fit the pattern, and what else is in
+    pictures. Raises `InputError`, naming a file, for what does not fit.
     """
-    path = Path(source)
-    if pattern is None:
-        picture = picture_of_views(path, note)
+    if isinstance(source, np.ndarray):
+        files = source
+    elif pattern is None:
+        picture = picture_of_views(Path(source), note)
         pages = ViewTable(grid=grid, order=order, axes="NHWC")
-        return views_of(pages.by_camera(_radiance_of(picture, encoding), str(path)), optics, cfa)
-    files = order.arrange(files_by_camera(path, pattern, grid, order, note))
+        return _views_of(pages.by_camera(_radiance_of(picture, encoding), str(source)), optics, cfa)
+    else:
+        files = order.arrange(files_by_camera(Path(source), pattern, grid, order, note))
     if files.ndim > 2:
         raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
-    return views_of(radiance_of_files(files, encoding, report, note), optics, cfa)
+    radiance, first = np.empty(0), None
+    unused: list[str] = []
+    for done, (camera, path) in enumerate(np.ndenumerate(files), start=1):
+        picture = picture_of(path, VIEWS)
+        if picture.pages > 1:
+            raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
+        if first is None:
+            first = path.name, picture.layout()
+            radiance = np.empty((*files.shape, *picture.shape), np.float32)
+        if picture.layout() != first[1]:
+            raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
+        if isinstance(optics, CameraGrid) and picture.shape[:2] != optics.shape_HW:
+            sizes = times(picture.shape[:2]), times(optics.shape_HW)
+            raise InputError(f"{path}: is {sizes[0]} px, and {sizes[1]} are stated, rows x columns")
+        unused += [f"{picture.unused} in {path.name}"] if picture.unused else []
+        radiance[camera] = _radiance_of(picture, encoding)[0]
+        report("pictures", done, files.size)
+    if unused:
+        note(f"not used: {listed_names(unused)}")
+    return _views_of(radiance, optics, cfa)
 
 
 def import_arrays(
@@ -107,7 +129,7 @@ def import_arrays(
         radiance = to_radiance(np.asarray(views), encoding)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
-    return views_of(radiance, optics, cfa)
+    return _views_of(radiance, optics, cfa)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,31 +141,7 @@ class KnownViews:
     z_range_mm: tuple[float, float] | None = None
 
 
-def radiance_of_files(files: np.ndarray, encoding: Encoding | None, report: Report, note: Note) -> np.ndarray:
-    """Radiance (K, L, H, W, C) of pictures of one size and type, whose files are (K, L).
-
-    `note` takes what else is in them. Raises `InputError`, naming the file, if one differs.
-    """
-    radiance, first = np.empty(0), None
-    unused: list[str] = []
-    for done, (camera, path) in enumerate(np.ndenumerate(files), start=1):
-        picture = picture_of(path, VIEWS)
-        if picture.pages > 1:
-            raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
-        if first is None:
-            first = path.name, picture.layout()
-            radiance = np.empty((*files.shape, *picture.shape), np.float32)
-        if picture.layout() != first[1]:
-            raise InputError(f"{path}: {picture.layout()}, where {first[0]} has {first[1]}")
-        unused += [f"{picture.unused} in {path.name}"] if picture.unused else []
-        radiance[camera] = _radiance_of(picture, encoding)[0]
-        report("pictures", done, files.size)
-    if unused:
-        note(f"not used: {listed_names(unused)}")
-    return radiance
-
-
-def views_of(radiance: np.ndarray, cameras: Optics | CameraGrid, cfa: str | None) -> Views:
+def _views_of(radiance: np.ndarray, cameras: Optics | CameraGrid, cfa: str | None) -> Views:
     """Views as a sensor with the Bayer pattern `cfa` records them.
 
     Of RGB each pixel keeps the colour of its filter; radiance of one channel is taken for mosaics.
@@ -330,7 +328,7 @@ def import_lens_array(
     views = _cut(rows, across, math.floor(lenses.pitch_px[0]), 2).swapaxes(1, 2)  # (K, h, L, w, C) before
     if lenses.inverted:
         views = views[:, :, ::-1, ::-1]
-    return views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
+    return _views_of(np.ascontiguousarray(order.arrange(views)), optics, cfa)
 
 
 def import_interlaced(
@@ -358,7 +356,7 @@ def import_interlaced(
     if cfa is not None and channels == 1:
         raise InputError(f"{path}: is a mosaic, whose pattern interlaced views break; give it in colours")
     blocks = _radiance_of(picture, encoding).reshape(height // rows, rows, width // cols, cols, channels)
-    return views_of(np.ascontiguousarray(order.arrange(blocks.transpose(1, 3, 0, 2, 4))), optics, cfa)
+    return _views_of(np.ascontiguousarray(order.arrange(blocks.transpose(1, 3, 0, 2, 4))), optics, cfa)
 
 
 def _starts(count: int, pitch: float, offset: float, size: int, how: str, path: str | Path) -> np.ndarray:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.base import InputError, Report, silent, times
+from pcii.base import InputError, Report, silent
 from pcii.exchange.count_arrays import import_counts
-from pcii.exchange.elemental_images import radiance_of_files, views_of
+from pcii.exchange.elemental_images import import_images
 from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
 from pcii.exchange.number_files import open_array
 from pcii.exchange.posed_exports import MM_PER_M
@@ -51,13 +51,7 @@ def import_posed_pictures(
     """
     file = read_transforms(source, note=note)
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
-    radiance = radiance_of_files(files, encoding, report, note)
-    if radiance.shape[2:4] != grid.shape_HW:
-        raise InputError(
-            f"{files[0, 0]}: is {times(radiance.shape[2:4])} px, where {file.path.name} says "
-            f"{times(grid.shape_HW)}, rows x columns"
-        )
-    return views_of(radiance, grid, cfa)
+    return import_images(files, None, grid, encoding=encoding, cfa=cfa, report=report, note=note)
 
 
 def import_posed_cubes(

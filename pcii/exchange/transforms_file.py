@@ -101,13 +101,6 @@ class TransformsFile:
         return visible(self.file_paths[number].relative_to(self.path.parent).as_posix())
 
 
-def transforms_in(source: Path) -> Path | None:
-    """The file to read if `source` is a .json file or a folder with a transforms.json, else None."""
-    if source.suffix == ".json" and source.is_file():
-        return source
-    return source / TRANSFORMS if (source / TRANSFORMS).is_file() else None
-
-
 def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     """Read a transforms.json of anybody, or that of a folder.
 
@@ -118,7 +111,7 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     length, matrices that are no poses, paths that are used twice or lead out of the folder, photon cubes that
     are not packed along the width, and a single cube whose camera moves.
     """
-    file = transforms_in(Path(path)) or Path(path)
+    file = Path(path) / TRANSFORMS if Path(path).is_dir() else Path(path)
     content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
     try:
         document = _Document.model_validate(json.loads(content))
