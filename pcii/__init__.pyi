@@ -9,13 +9,14 @@ from .evaluation.comparison import evaluate as evaluate
 from .evaluation.summary import mean_interval as mean_interval, sign_flip_p as sign_flip_p
 from .evaluation.training_examples import Examples as Examples, examples as examples
 from .evidence.camera_fit import check_grid as check_grid
-from .exchange.count_arrays import import_arrays as import_arrays, import_counts as import_counts
+from .exchange.count_arrays import import_counts as import_counts
+from .exchange.elemental_images import LensArray as LensArray, import_arrays as import_arrays
+from .exchange.elemental_images import import_images as import_images
+from .exchange.elemental_images import import_lens_array as import_lens_array
 from .exchange.export_formats import export_dataset as export_dataset
-from .exchange.frame_formats import FrameFormat as FrameFormat
+from .exchange.frame_files import FrameFormat as FrameFormat
 from .exchange.hci_scenes import import_hci as import_hci
-from .exchange.image_folders import LensArray as LensArray, import_images as import_images
-from .exchange.image_folders import import_lens_array as import_lens_array
-from .exchange.stated_cameras import Optics as Optics, ViewOrder as ViewOrder
+from .exchange.stated_images import Optics as Optics, ViewOrder as ViewOrder
 from .metrics.scoring import score as score
 from .metrics.true_masks import TrueFocus as TrueFocus
 from .removal.methods import removal_methods as removal_methods, segment as segment

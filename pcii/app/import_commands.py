@@ -1,5 +1,12 @@
-"""The command `pcii import`: images made by others become a dataset."""
+"""The command `pcii import`: images made by others become a dataset.
 
+The parameters of a reader are its options. `optics`, `order`, `lenses`, `encoding` and `stored` stand for
+several options, which a dataclass lists. An option that the reader of a source does not take is refused.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,16 +20,27 @@ from pcii.evidence import CameraFit, check_grid, without_hot_pixels
 from pcii.exchange import (
     AS_COUNTED,
     NO_DEPTH,
-    Cameras,
+    PARAMETERS,
+    TRANSFORMS,
+    VIEWS,
     DepthFile,
+    Encoding,
     FrameFormat,
-    Lenses,
+    KnownViews,
+    LensArray,
     Note,
-    Pair,
-    PictureLight,
+    Optics,
     ViewOrder,
-    WholePair,
-    read,
+    import_arrays,
+    import_counts,
+    import_hci,
+    import_images,
+    import_interlaced,
+    import_lens_array,
+    import_posed_cubes,
+    import_posed_pictures,
+    kind_of,
+    read_transforms,
 )
 from pcii.sections import warn_of_saturation
 from pcii.store import check_free, save_dataset
@@ -31,6 +49,67 @@ from pcii.types import FocalPlanes, PhotonCounts, Views, depth_of_total_disparit
 MOVING_SHARE = 0.25
 """A point whose total disparity is this share of a view's longer side is elsewhere in each view, so that what
 is at the same pixel in most of them is a fault of the sensor, or at infinity."""
+COLMAP_FILES = ("cameras.bin", "cameras.txt", "sparse/0/cameras.bin", "sparse/0/cameras.txt")
+WholePair = tuple[int, int] | None
+Pair = tuple[float, float] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cameras:
+    """Where cameras stand and how they see."""
+
+    pitch_mm: Pair = None
+    """Distance between neighbouring cameras, x and y. Of a lens array: its lens pitch in pixels, by
+    default."""
+    focal_mm: float | None = None
+    """Focal length: from the pinhole to the sensor."""
+    sensor_mm: float | None = None
+    """Width of the sensor that a whole picture shows."""
+    pixel_mm: float | None = None
+    """Side of a pixel, instead of --sensor-mm."""
+    shear_px: Pair = None
+    """Disparity, x and y, that was taken out of the pictures of a converging grid."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lenses:
+    """Where lenses are in a picture of a lens array."""
+
+    lens_array: WholePair = None
+    """Rows and columns of lenses whose images one picture holds side by side."""
+    lens_pitch_px: Pair = None
+    """Distance from lens to lens in the picture, x and y; need not be whole."""
+    lens_offset_px: Pair = None
+    """Left upper corner of the first lens image, x and y. Default: 0 0."""
+    inverted: bool = False
+    """Each lens image is upside down, as a sensor right behind the lenses sees it."""
+    interlaced: WholePair = None
+    """Rows and columns of views of which a picture has a pixel each in every block, as under a micro lens."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureLight:
+    """How numbers stand for light."""
+
+    srgb: bool = False
+    """Numbers are sRGB: the default for whole numbers in pictures."""
+    linear: bool = False
+    """Numbers are proportional to light: the default for floats."""
+    gamma: float | None = None
+    """Light is the number (from 0 to 1) to the power of this."""
+
+
+READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
+    import_images: ("pictures", ()),
+    import_lens_array: ("a picture of a lens array", ()),
+    import_interlaced: ("a picture of interlaced views", ()),
+    import_arrays: ("an array of light", ()),
+    import_counts: ("photon counts", ("counts",)),
+    import_hci: ("a scene of the HCI 4D light field benchmark", ()),
+    import_posed_pictures: ("pictures with a transforms.json", ()),
+    import_posed_cubes: ("photon cubes with a transforms.json", ("counts",)),
+}
+"""What a reader reads, and the flags that it meets by its nature."""
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 
@@ -111,28 +190,38 @@ def import_dataset(
         raise InputError("--seed: is for --photons N, which draws photon counts")
     options: dict[str, Any] = {"pattern": pattern, "grid": grid, "axes": axes, "key": key, "counts": counts}
     options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
-    for group in (cameras, order, lenses, light, stored):
+    groups = {"optics": cameras, "order": order, "lenses": lenses, "encoding": light, "stored": stored}
+    for group in groups.values():
         options |= vars(group)
     options["frames"] = frames
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
-        imported = read(source, options, report=report, note=notes.append)
-        images: list[Views | PhotonCounts] = [imported.images]
-        origin = imported.origin
+        reader = _choose_reader(source, options)
+        listeners = {"report": report, "note": notes.append}
+        arguments = _arguments(reader, source, options, groups, listeners)
+        result = reader(source, **arguments)
+        known = result if isinstance(result, KnownViews) else None
+        read = result.views if isinstance(result, KnownViews) else result
+        images: list[Views | PhotonCounts] = [read]
+        origin = f"{READERS[reader][0]} of {source.resolve().name}"
+        if arguments.get("encoding"):
+            origin += f", decoded by {arguments['encoding']}"
+        if isinstance(read, PhotonCounts) and (read.readout.frames or 0) > 1:
+            origin += f", {read.readout.frames} frames"
         if photons is not None:
-            if isinstance(imported.images, PhotonCounts):
+            if isinstance(read, PhotonCounts):
                 raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
-            images.append(limit_photons(imported.images, photons, seed=seed or 1))
+            images.append(limit_photons(read, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
-        z_range = z_range_mm or imported.z_range_mm
-        truth = true_depth.truth_for(imported.images.grid, notes.append) or imported.truth
-        fit = check_grid(_without_hot_pixels(imported.images, notes.append), z_range, order=order)
+        z_range = z_range_mm or (known and known.z_range_mm)
+        truth = true_depth.truth_for(read.grid, notes.append) or (known and known.truth)
+        fit = check_grid(_without_hot_pixels(read, notes.append), z_range, order=order)
         surfaces: tuple[float, ...] = ()
-        is_counted = isinstance(imported.images, PhotonCounts)
-        if is_counted and not z_mm and z_range is not None and imported.images.grid.view_count > 1:
+        is_counted = isinstance(read, PhotonCounts)
+        if is_counted and not z_mm and z_range is not None and read.grid.view_count > 1:
             # In the noise of few photons contrast is no sure sign.
-            surfaces, sentence = surface_depths(imported.images, z_range)
+            surfaces, sentence = surface_depths(read, z_range)
             notes += [sentence] * bool(surfaces)
         dataset = save_dataset(
             out,
@@ -145,13 +234,14 @@ def import_dataset(
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
-    channels = images[0].channel_count if isinstance(images[0], Views) else 1
+    channels = read.channel_count if isinstance(read, Views) else 1
     sensor = f"{dataset.cfa} Bayer pattern" if dataset.cfa else "mono" if channels == 1 else "RGB"
     say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         say(note)
-    # With wrong numbers of the cameras, which a warning names, no order of views is right.
-    is_judged = not imported.states_cameras and not any(note.startswith("warning:") for note in notes)
+    # Cameras that the source states are not questioned. With wrong numbers, which a warning names, no order
+    # of views is right.
+    is_judged = "optics" in arguments and not any(note.startswith("warning:") for note in notes)
     advice = _advice(fit, order, lenses, z_range) if is_judged else None
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
@@ -159,6 +249,92 @@ def import_dataset(
     if not surfaces:
         _say_depths(fit, is_counted=is_counted)
     say_next("pcii", "run", out, "-o", results_folder(out))
+
+
+def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any]:
+    """The reader of a source; `InputError` for a source that is not there, or a folder without a pattern."""
+    if not source.exists():
+        raise InputError(f"{source}: there is no such file or folder")
+    pattern, is_folder = options["pattern"], source.is_dir()
+    if options["lens_array"] is not None:
+        return import_lens_array
+    if pattern is None:
+        if source.suffix == ".json" or (source / TRANSFORMS).is_file():
+            has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
+            return import_posed_cubes if has_cubes else import_posed_pictures
+        if (source / PARAMETERS).is_file():
+            return import_hci
+        if any((source / name).is_file() for name in COLMAP_FILES):
+            raise InputError(
+                f"{source}: is a model of COLMAP; if its cameras are of one plane grid, make it a "
+                "transforms.json with ns-process-data of nerfstudio, or name pictures and cameras with "
+                "--pattern and --pitch-mm"
+            )
+        if is_folder:
+            raise InputError(
+                f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"'
+            )
+    if options["interlaced"] is not None:
+        return import_interlaced
+    if any(options[name] for name in ("counts", "bits", "bitpack", "frame_size")):
+        return import_counts
+    return import_images if pattern is not None or kind_of(source) in VIEWS else import_arrays
+
+
+def _arguments(
+    reader: Callable[..., Any],
+    source: Path,
+    options: Mapping[str, Any],
+    groups: Mapping[str, Any],
+    listeners: Mapping[str, Any],
+) -> dict[str, Any]:
+    """The arguments of a reader, from the values of all options, None or False where they were not given.
+
+    `groups` are the parameters of readers that stand for several options. Raises `InputError` for an option
+    that does not go with the source.
+    """
+    what, flags = READERS[reader]
+    parameters = {*inspect.signature(reader).parameters}
+    accepted = parameters.union(flags, *(vars(groups[name]) for name in groups.keys() & parameters))
+    names = [name for name, value in options.items() if value is not None and value is not False]
+    others = ", ".join(f"--{name.replace('_', '-')}" for name in names if name not in accepted)
+    if others:
+        raise InputError(f"{others}: not for {source}, which is read as {what}")
+    made = {"lenses": _lens_array, "optics": _optics, "encoding": _encoding}
+    values = {**options, **groups, **listeners}
+    values |= {name: make(options) for name, make in made.items() if name in parameters}
+    return {name: value for name, value in values.items() if name in parameters}
+
+
+def _optics(options: Mapping[str, Any]) -> Optics:
+    """The cameras' optics; `InputError` if a length is missing."""
+    lengths = {name: options[name] for name in vars(CAMERAS) if options[name] is not None}
+    if options["lens_pitch_px"] is not None and "pixel_mm" in lengths:
+        x, y = options["lens_pitch_px"]
+        lengths.setdefault("pitch_mm", (x * lengths["pixel_mm"], y * lengths["pixel_mm"]))
+    missing = [f"--{name.replace('_', '-')}" for name in ("pitch_mm", "focal_mm") if name not in lengths]
+    missing += ["--sensor-mm or --pixel-mm"] * (not lengths.keys() & {"sensor_mm", "pixel_mm"})
+    if missing:
+        raise InputError(f"{', '.join(missing)}: missing; cameras need pitch, focal length and pixel size")
+    return Optics(**lengths)
+
+
+def _lens_array(options: Mapping[str, Any]) -> LensArray:
+    """Where lenses are; `InputError` without their pitch."""
+    if options["lens_pitch_px"] is None:
+        raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
+    rows, cols = options["lens_array"]
+    offset_px, inverted = options["lens_offset_px"] or (0.0, 0.0), options["inverted"]
+    return LensArray(
+        rows=rows, cols=cols, pitch_px=options["lens_pitch_px"], offset_px=offset_px, inverted=inverted
+    )
+
+
+def _encoding(options: Mapping[str, Any]) -> Encoding | None:
+    """How numbers stand for light; None for the usual way. `InputError` for two ways."""
+    if options["srgb"] + options["linear"] + (options["gamma"] is not None) > 1:
+        raise InputError("--srgb, --linear, --gamma: give one of them")
+    return "srgb" if options["srgb"] else "linear" if options["linear"] else options["gamma"]
 
 
 def _without_hot_pixels(images: Views | PhotonCounts, note: Note) -> Views | PhotonCounts:
@@ -184,11 +360,10 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
         changes = {n: value for n, value in vars(fit.order).items() if value != getattr(order, n)}
         if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
             changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
-        flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}
         words = [
             f"{word} --{' --'.join(names).replace('_', '-')}"
-            for word, names in (("with", flags[True]), ("without", flags[False]))
-            if names
+            for word, is_set in (("with", True), ("without", False))
+            if (names := [name for name, value in changes.items() if value is is_set])
         ]
         better = f"the views fit together far better {' and '.join(words)}"
         if changes.keys() == {"flip_cols"} and fit.shear_px is not None:

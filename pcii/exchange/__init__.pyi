@@ -1,15 +1,16 @@
-from .array_files import open_array as open_array
-from .count_arrays import import_arrays as import_arrays, import_counts as import_counts
+from .count_arrays import import_counts as import_counts
 from .depth_files import DepthFile as DepthFile, NO_DEPTH as NO_DEPTH
+from .elemental_images import import_arrays as import_arrays, import_images as import_images
+from .elemental_images import import_interlaced as import_interlaced, import_lens_array as import_lens_array
+from .elemental_images import KnownViews as KnownViews, LensArray as LensArray
 from .export_formats import export as export, export_dataset as export_dataset
-from .export_pictures import write_png as write_png
-from .frame_formats import AS_COUNTED as AS_COUNTED, FrameFormat as FrameFormat
-from .hci_scenes import import_hci as import_hci
-from .image_folders import LensArray as LensArray, import_images as import_images
-from .image_folders import import_lens_array as import_lens_array
-from .import_requests import Cameras as Cameras, Lenses as Lenses, Pair as Pair, PictureLight as PictureLight
-from .import_requests import WholePair as WholePair, read as read
-from .pixel_files import UPRIGHT as UPRIGHT, decode as decode, picture_of as picture_of
-from .posed_views import camera_grid_of as camera_grid_of, find_grid as find_grid
-from .stated_cameras import AS_STORED as AS_STORED, Note as Note, Optics as Optics, ViewOrder as ViewOrder
-from .transforms_file import TransformsFile as TransformsFile, read_transforms as read_transforms
+from .frame_files import AS_COUNTED as AS_COUNTED, FrameFormat as FrameFormat
+from .hci_scenes import import_hci as import_hci, PARAMETERS as PARAMETERS
+from .number_files import decode as decode, kind_of as kind_of, open_array as open_array
+from .number_files import picture_of as picture_of, UPRIGHT as UPRIGHT, VIEWS as VIEWS
+from .posed_exports import TRANSFORMS as TRANSFORMS, write_png as write_png
+from .posed_views import find_grid as find_grid, import_posed_cubes as import_posed_cubes
+from .posed_views import import_posed_pictures as import_posed_pictures
+from .stated_images import AS_STORED as AS_STORED, Encoding as Encoding, Note as Note, Optics as Optics
+from .stated_images import ViewOrder as ViewOrder
+from .transforms_file import read_transforms as read_transforms, TransformsFile as TransformsFile

@@ -1,6 +1,6 @@
-"""Arrays of light, and photon counts of arrays and files, whose frames are added up.
+"""Photon counts of arrays and files, whose frames are added up, and what looks wrong in their numbers.
 
-How frames are kept is a `FrameFormat`, where they are `frame_stacks`.
+Where frames are and how they are kept is in `frame_files`.
 """
 
 from collections.abc import Iterator
@@ -9,72 +9,33 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base import InputError, Report, silent
-from pcii.exchange.array_files import open_array
-from pcii.exchange.frame_formats import (
+from pcii.exchange.frame_files import (
     AS_COUNTED,
-    SURE_NATS,
+    MOST_BITS,
+    BitOrder,
+    FrameFiles,
     FrameFormat,
-    expected_above_one,
-    warn_of_bit_order,
-    warn_of_dark_columns,
-    warn_of_numbers,
+    FrameStack,
+    stacks_of,
 )
-from pcii.exchange.frame_stacks import FrameFiles, FrameStack, ViewTable, stacks_of
-from pcii.exchange.image_folders import views_of
-from pcii.exchange.pixel_files import Encoding, to_radiance
-from pcii.exchange.stated_cameras import AS_STORED, Note, Optics, ViewOrder, warn
-from pcii.types import CameraGrid, PhotonCounts, Views, mosaic
+from pcii.exchange.stated_images import AS_STORED, Note, Optics, ViewOrder, ViewTable, warn
+from pcii.types import CameraGrid, PhotonCounts, mosaic
 
+SURE_NATS = 20.0
+"""How much evidence a sentence on the numbers needs: by chance alone one import in e^20 would get it."""
+MIN_COLUMN_MEAN = 10
+"""Mean number of counts of a column from which a column without any is warned of; by chance it is one in
+e^10. If it is smaller, dim captures are warned of without a reason."""
+MIN_JUDGED = 100
+"""Numbers above 0 from which they are judged. If it is smaller, chance decides."""
+NARROW = 0.5
+"""Share of the scatter of photon counts below their median from which they are taken to have an offset."""
+SURE_DEVIATIONS = 6.0
+"""Standard errors from which the order of bits is taken to be the other one."""
 PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""
 MOST_KEPT = 1 << 24
 """Largest number of single counts of all views whose frames are kept."""
-FRAMES_AT_ONCE = 255
-"""Their sum fits in a byte."""
-
-
-def import_arrays(
-    source: str | Path | np.ndarray,
-    optics: Optics,
-    *,
-    grid: tuple[int, int] | None = None,
-    order: ViewOrder = AS_STORED,
-    encoding: Encoding | None = None,
-    cfa: str | None = None,
-    axes: str | None = None,
-    key: str | None = None,
-) -> Views:
-    """Radiance of an array (K, L, H, W) or (K, L, H, W, C), C = 1 or 3, or of a file of one.
-
-    With a `grid` (K, L) it is (K L, H, W) or (K L, H, W, C); or its `axes` are named, such as "HWKL", N
-    being views. Files are .npy, .npz, .mat and HDF5, of which `key` names one of several arrays. Floats are
-    linear, unless `encoding` says otherwise; whole numbers need it: they may be sRGB of pictures or linear
-    values of a sensor, which the file does not say. `cfa` is a Bayer pattern, of which arrays of one channel
-    are mosaics. Raises `InputError` for what does not fit.
-    """
-    is_array = isinstance(source, np.ndarray)
-    numbers, name = (source, "array") if is_array else (open_array(Path(source), key), str(source))
-    views = ViewTable(grid=grid, order=order, axes=axes).by_camera(numbers, name, "H, W[, C]")
-    if views.dtype.kind != "f" and views.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
-        raise InputError(f"{name}: expected float, uint8, uint16, or --counts for photons; got {views.dtype}")
-    if views.ndim == 4:
-        if grid is None and axes is None and views.shape[3] in (3, 4):
-            raise InputError(
-                f"{name}: has the shape {numbers.shape}; give --grid if it is (N, H, W, C), or --axes"
-            )
-        views = views[..., None]
-    if views.ndim != 5 or 0 in views.shape or views.shape[4] not in (1, 3):
-        raise InputError(f"{name}: expected (K, L, H, W) or (K, L, H, W, 1 or 3), got {numbers.shape}")
-    if views.dtype.kind == "u" and encoding is None:
-        raise InputError(
-            f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
-            "--srgb, --linear or --gamma (encoding)"
-        )
-    try:
-        radiance = to_radiance(np.asarray(views), encoding)
-    except InputError as fault:
-        raise InputError(f"{name}: {fault}") from None
-    return views_of(radiance, optics, cfa)
 
 
 def import_counts(
@@ -94,17 +55,17 @@ def import_counts(
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
-    An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too.
-    A file of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, an array (N, H, W) or
-    (H, W) in a .npy, .npz, .mat or HDF5 file, in which `key` names it, or has no header (see `FrameFormat`);
-    with {frame} in the pattern it is one frame.
-    For `pattern` and `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array,
-    or a file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W); with a `grid` (K, L) it is
-    (K L, H, W) or (K L, N, H, W); or its `axes` are named, such as "HWKL" or "NTHW", N being views and T
-    frames. Of frames in three channels each pixel keeps the colour of its filter in
-    `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up, from 0. The frame
-    of each single count of frames of one bit is kept, up to 2^24 counts. `note` takes sentences on what is
-    left out or looks wrong. Raises `InputError` for counts that are negative or fractional in any frame.
+    An array (K, L) of `Path` names the file of each view. A `CameraGrid` states the size of views too. A file
+    of a view is a TIFF, each with as many pages, a grey PNG of 1, 8 or 16 bits, an array (N, H, W) or (H, W)
+    in a .npy, .npz, .mat or HDF5 file, in which `key` names it, or has no header (see `FrameFormat`); with
+    {frame} in the pattern it is one frame. For `pattern` and `grid`, and for one TIFF file whose pages are
+    the views, see `import_images`. An array, or a file of one, is (K, L, H, W) or, with N frames,
+    (K, L, N, H, W); with a `grid` (K, L) it is (K L, H, W) or (K L, N, H, W); or its `axes` are named, such
+    as "HWKL" or "NTHW", N being views and T frames. Of frames in three channels each pixel keeps the colour
+    of its filter in `cfa`. `stored` says how frames are kept, `frames` are the first and the last to add up,
+    from 0. The frame of each single count of frames of one bit is kept, up to 2^24 counts. `note` takes
+    sentences on what is left out or looks wrong. Raises `InputError` for counts that are negative or
+    fractional in any frame.
     """
     stored.check()
     stacks = stacks_of(source, pattern, ViewTable(grid=grid, order=order, axes=axes), key, stored, note)
@@ -127,7 +88,7 @@ def import_counts(
     for number, (camera, stack) in enumerate(np.ndenumerate(stacks)):
         for start, piece in _pieces(stack, name, first, begin, stop):
             if number == 0 and start == begin:
-                warn_of_numbers(name, piece, stored, note)
+                _warn_of_numbers(name, piece, stored, note)
             counts = stored.counts_of(stack.name, piece, dead)
             if cfa is not None and counts.ndim == 4:
                 counts = mosaic(counts, cfa)
@@ -136,8 +97,8 @@ def import_counts(
     if dead is not None:
         note(f"{np.count_nonzero(dead)} pixels of --mask count nothing")
     if stored.bitpack:
-        warn_of_dark_columns(total.sums, "--width" if isinstance(optics, Optics) else "w", note)
-        warn_of_bit_order(total.sums, stored.bit_order or "big", cfa, note)
+        _warn_of_dark_columns(total.sums, note)
+        _warn_of_bit_order(total.sums, stored.bit_order or "big", cfa, note)
     return total.photon_counts(cfa, name, note)
 
 
@@ -182,29 +143,28 @@ class _Sum:
         self.grid, self.frames, self.bits = grid, frames, bits
         most = np.iinfo(np.uint64).max if bits is None else frames * ((1 << bits) - 1)
         self.sums = np.zeros(grid.shape_KLHW, np.min_scalar_type(most))
-        self.singles: list[np.ndarray] | None = [np.empty((0, 5), np.int32)]
+        self.singles = [np.empty((0, 5), np.int32)]
         self.number, self.is_above_one = 0, False
 
     def add(self, camera: tuple[int, ...], first: int, counts: np.ndarray) -> None:
         """Add frames (T, H, W) of a camera, from the frame number `first` on."""
-        self.is_above_one |= self.bits != 1 and bool(counts.max(initial=0) > 1)
-        if self.is_above_one:
-            self.singles = None
-            self.sums[camera] += counts.sum(axis=0, dtype=np.uint64).astype(self.sums.dtype)
+        self.sums[camera] += counts.sum(axis=0, dtype=self.sums.dtype)
+        self.is_above_one |= bool(counts.max(initial=0) > 1)
+        self.number += int(np.count_nonzero(counts))
+        if self.is_above_one or self.number > MOST_KEPT:
+            self.singles.clear()
             return
-        bits = counts.astype(np.uint8, copy=False)
-        for low in range(0, len(bits), FRAMES_AT_ONCE):
-            self.sums[camera] += np.add.reduce(bits[low : low + FRAMES_AT_ONCE], axis=0, dtype=np.uint8)
-        self.number += int(np.count_nonzero(bits))
-        if self.singles is not None and self.number <= MOST_KEPT:
-            frame, i, j = np.nonzero(bits)
-            k, l = (np.full(frame.size, index) for index in camera)
-            self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
+        frame, i, j = np.nonzero(counts)
+        k, l = (np.full(frame.size, index) for index in camera)
+        self.singles.append(np.stack([k, l, i, j, frame + first], axis=1).astype(np.int32))
 
     def photon_counts(self, cfa: str | None, name: str, note: Note) -> PhotonCounts:
         """The counts; of numbers 0 and 1 alone in light that would give others as frames of one bit."""
         if self.bits is None and not self.is_above_one:
-            expected = expected_above_one(self.number, self.sums.size * self.frames)
+            samples = self.sums.size * self.frames
+            dark = 1 - self.number / samples
+            # Poisson counts of the same light would have at least so many numbers above 1.
+            expected = samples * (1 - dark * (1 - np.log(dark)) if dark > 0 else 1.0)
             if expected > SURE_NATS:
                 note(
                     f"{name} is taken for frames of one bit: no pixel of a frame counts more than 1, where "
@@ -212,14 +172,91 @@ class _Sum:
                 )
                 self.bits = 1
         options = {"cfa": cfa, "frames": self.frames, "bits": self.bits}
-        if self.bits != 1:
-            return PhotonCounts.from_dense(self.sums, self.grid, **options)
-        if self.singles is None or self.number > MOST_KEPT:
+        if self.bits == 1 and self.number <= MOST_KEPT:
+            k, l, i, j, frame = np.concatenate(self.singles).T
+            n = np.ones(k.size, np.uint8)
+            return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
+        if self.bits == 1:
             note(
                 f"only the sums of {self.frames} frames are kept: there are {self.number} counts, and the "
                 f"frame of each is kept for up to {MOST_KEPT}"
             )
-            return PhotonCounts.from_dense(self.sums, self.grid, **options)
-        k, l, i, j, frame = np.concatenate(self.singles).T
-        n = np.ones(k.size, np.uint8)
-        return PhotonCounts.from_events(k, l, i, j, n, self.grid, frame=frame, **options)
+        return PhotonCounts.from_dense(self.sums, self.grid, **options)
+
+
+def _warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: Note) -> None:
+    """Warn of frames (T, H, W[, 3]) whose numbers look like packed bits, multiples, marks, or an offset.
+
+    What is `stated` of them is not questioned.
+    """
+    if stored.dtype.kind not in "iu" or stated.bitpack or not stated.offset == stated.gain is None:
+        return
+    step = int(np.gcd.reduce(stored, axis=None))
+    if step > 1 and np.count_nonzero(stored) * np.log(step) > SURE_NATS:
+        what = f"all numbers of {name} are multiples of {step}"
+        note(f"warning: {what}; if that is one photon, give --gain {step}")
+        return
+    if stated.bits is not None:
+        return
+    most = np.iinfo(stored.dtype).max
+    marks = int(np.count_nonzero(stored == most))
+    if marks:
+        bits = 8 * stored.dtype.itemsize
+        advice = "give --mask FILE if that marks dead pixels"
+        advice += f", or --bits {bits} if they are saturated" if bits <= MOST_BITS else ""
+        note(f"warning: {marks} numbers of {name} are {most}: {advice}")
+        stored = stored[stored != most]
+    if np.count_nonzero(stored) < MIN_JUDGED:
+        return
+    if stored.dtype == np.uint8:
+        # High bits are set about as often as the low ones; in dim counts they are rarer.
+        share = np.unpackbits(stored.reshape(-1, 1), axis=-1).mean(axis=0)
+        if share.max() < 0.4 and share[:4].sum() > share.sum() / 3:
+            note(
+                f"warning: {name} looks like bits packed eight to a byte; if so, import again with --bitpack"
+            )
+            return
+    least, low, median = np.quantile(stored, (0.0, 0.16, 0.5))
+    if least > 0 and median - low < NARROW * np.sqrt(median) - 1:
+        note(
+            f"warning: no number of {name} is below {least:g}, and they scatter about {median:g} by "
+            f"{median - low:g}, where photon counts would by {np.sqrt(median):.2g}: subtract what the camera "
+            "reads without light with --offset, and divide by what a photon adds with --gain"
+        )
+
+
+def _warn_of_dark_columns(sums: np.ndarray, note: Note) -> None:
+    """Warn of columns at the end of packed rows without a count in any view."""
+    columns = sums.sum(axis=(0, 1, 2), dtype=np.int64)
+    dark = columns.size - 1 - int(np.flatnonzero(columns).max(initial=-1))
+    if dark and columns.sum() >= MIN_COLUMN_MEAN * columns.size:
+        note(
+            f"warning: the last {dark} columns of {columns.size} have no count in any view; if the camera "
+            "has fewer, correct the width (--width, or w of transforms.json), or cut them off the frames"
+        )
+
+
+def _warn_of_bit_order(sums: np.ndarray, order: BitOrder, cfa: str | None, note: Note) -> None:
+    """Warn if views (K, L, H, W) are smoother where the bits of each byte are turned round.
+
+    Steps between neighbours of one colour at the ends of bytes are compared in both orders: what stands there
+    side by side is, in the wrong order, 15 pixels apart. Views and rows show how far that is by chance.
+    """
+    apart, width = (1 if cfa is None else 2), sums.shape[3] // 8 * 8
+    if width < 16:
+        return
+    gains = []
+    for view in sums.reshape(-1, *sums.shape[2:]):
+        groups = view[:, :width].astype(np.float64).reshape(len(view), -1, 8)
+        ends, starts = groups[:, :-1], groups[:, 1:]
+        as_stored = (ends[:, :, 8 - apart] - starts[:, :, 0]) ** 2
+        turned = (ends[:, :, apart - 1] - starts[:, :, 7]) ** 2
+        gains.append((as_stored - turned).mean(axis=1))
+    gain = np.concatenate(gains)
+    error = gain.std(ddof=1) / np.sqrt(gain.size) if gain.size > 1 else np.inf
+    if gain.mean() > SURE_DEVIATIONS * error > 0:
+        other = "little" if order == "big" else "big"
+        note(
+            "warning: neighbours in two bytes differ as if the bits of each byte were in the other order; if "
+            f"so, import again with --bit-order {other}"
+        )

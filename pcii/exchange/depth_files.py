@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base import InputError
-from pcii.exchange.array_files import open_array
-from pcii.exchange.pixel_files import decode, kind_of, picture_of
-from pcii.exchange.stated_cameras import Note
+from pcii.exchange.number_files import decode, kind_of, open_array, picture_of
+from pcii.exchange.stated_images import Note
 from pcii.types import CameraGrid, Truth
 
 DEPTH_PICTURES = ("PNG", "TIFF", "EXR", "PFM")
@@ -49,12 +48,11 @@ class DepthFile:
             raise InputError(f"--depth-unit-mm: expected a length above 0, got {self.depth_unit_mm:g}")
         path = Path(self.depth)
         numbers = _numbers_in(path, self.depth_key)
-        if numbers.shape != grid.shape_HW:
+        if numbers.shape != grid.shape_HW or numbers.dtype.kind not in "iuf":
             raise InputError(
-                f"--depth: {path} is {numbers.shape}, and views are {grid.shape_HW}, rows x columns"
+                f"--depth: {path} is {numbers.dtype} {numbers.shape}; expected real numbers {grid.shape_HW}, "
+                "rows x columns of a view"
             )
-        if numbers.dtype.kind not in "iuf":
-            raise InputError(f"--depth: {path} holds {numbers.dtype}; expected real numbers")
         is_unknown = np.isnan(numbers) | (numbers == 0)
         if numbers.dtype.kind in "iu":
             is_unknown |= numbers == np.iinfo(numbers.dtype).max
@@ -70,22 +68,14 @@ class DepthFile:
             )
         hit = z_mm[np.isfinite(z_mm)]
         reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
-        if hit.size and hit.max() < grid.focal_mm:
-            note(
-                f"warning: {path.name} has depths of {reach}, nearer than the focal length of "
-                f"{grid.focal_mm:g} mm; if they are in metres, import again with --depth-unit-mm 1000"
-            )
         note(f"with the true depth of the virtual centre, {reach}, from {path.name}")
-        if is_unknown.any():
-            count = np.count_nonzero(is_unknown)
+        count = np.count_nonzero(is_unknown)
+        if count:
             note(f"{count} of {z_mm.size} pixels have no known depth there, and count in no score")
-        return Truth(
-            z_mm.astype(np.float32),
-            np.where(is_unknown, UNKNOWN, 0).astype(np.int16),
-            {UNKNOWN: "unknown depth"} if is_unknown.any() else {},
-            unscored=frozenset({UNKNOWN} if is_unknown.any() else ()),
-            are_objects_known=False,
-        )
+        names = {UNKNOWN: "unknown depth"} if count else {}
+        object_id = np.where(is_unknown, UNKNOWN, 0).astype(np.int16)
+        z_mm = z_mm.astype(np.float32)
+        return Truth(z_mm, object_id, names, unscored=frozenset(names), are_objects_known=False)
 
 
 NO_DEPTH = DepthFile()
@@ -94,7 +84,7 @@ NO_DEPTH = DepthFile()
 
 def _numbers_in(path: Path, key: str | None) -> np.ndarray:
     """The numbers (H, W) of a file of depth."""
-    kind = kind_of(path) if path.is_file() else None
+    kind = kind_of(path)
     if kind is None:
         try:
             return np.squeeze(open_array(path, key))
@@ -104,7 +94,7 @@ def _numbers_in(path: Path, key: str | None) -> np.ndarray:
     if channel is not None:
         return channel
     picture = picture_of(path, DEPTH_PICTURES)
-    pixels = next(decode(picture))
+    pixels = decode(picture)[0]
     if picture.pages > 1 or (pixels != pixels[..., :1]).any():
         raise InputError(f"--depth: {path} has colours or several pages; expected one map of depth")
     return pixels[..., 0]

@@ -1,19 +1,10 @@
-"""The command `export`, the formats that it writes, and those of single photons: events and photon cubes.
+"""The command `export`, the formats that it writes, and archives of events.
 
-    03_04/frames.npy        uint8 (T, H, ceil(W / 8)) of the camera of row 3, column 4
-    03_04/transforms.json   the same as a dataset of visionsim (NPY): a pose for each of the T frames
-    transforms.json         all cameras, and the grid: see `export_pictures`
-
-Bits of a photon cube are packed along the width, the first pixel in the highest bit, as numpy.packbits does;
-bits beyond the last pixel are 0. Blocks of a file without a set bit are not written: they are holes, which
-read as zeros and take no room on the disk.
-
-    train-000000.tar    of a collection: 000017.npz, the events of its dataset 17, and 000017.json, its row
-                        of the index; shards of a split, or "all", in an order that is drawn once for all
+train-000000.tar    of a collection: 000017.npz, the events of its dataset 17, and 000017.json, its row
+                    of the index; shards of a split, or "all", in an order that is drawn once for all
 """
 
 import io
-import json
 import tarfile
 from collections.abc import Callable
 from dataclasses import asdict
@@ -24,21 +15,12 @@ import numpy as np
 from cyclopts import Parameter
 
 from pcii.base import InputError, Report, Stages, json_bytes, named_in_errors, new_folder_safely, say, silent
-from pcii.exchange.export_pictures import (
-    TRANSFORMS,
-    frames_of,
-    intrinsics_of,
-    principal_points_px,
-    view_name,
-    write_nerfstudio,
-)
 from pcii.exchange.hci_scenes import write_hci
+from pcii.exchange.posed_exports import write_nerfstudio, write_photon_cubes
 from pcii.store import COLUMNS, Collection, Dataset, check_free, is_collection, open_collection, open_dataset
-from pcii.types import OPTIONAL_MAPS, FrameEvents, Light, Truth
+from pcii.types import OPTIONAL_MAPS, Light
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events", "webdataset"]
-ARCHIVE = "events.npz"
-FRAMES = "frames.npy"
 SHARD_BYTES = 1 << 28
 """A shard is full from here on: large enough to stream, small enough that several processes have some."""
 
@@ -86,7 +68,7 @@ def export_dataset(
                 )
             WRITERS[format](in_light(dataset), temporary)
         elif format == "webdataset":
-            write_shards(dataset, temporary, in_light, report)
+            _write_shards(dataset, temporary, in_light, report)
         else:
             for number, one in enumerate(dataset, start=1):
                 place = temporary / one.path.name
@@ -96,12 +78,7 @@ def export_dataset(
     return folder
 
 
-def write_events(dataset: Dataset, folder: Path) -> None:
-    """Write `events.npz`, the archive of `events_of`."""
-    (folder / ARCHIVE).write_bytes(events_of(dataset))
-
-
-def events_of(dataset: Dataset) -> bytes:
+def _events_of(dataset: Dataset) -> bytes:
     """Photons, cameras and truth as a NumPy archive, whose arrays need no pickle.
 
     `k`, `l`, `i`, `j`, `n` (events,); `frames`, `bits` and `frame` (photons,) of a camera that has frames, if
@@ -119,15 +96,21 @@ def events_of(dataset: Dataset) -> bytes:
     for name in ("z_mm", "z_range_mm"):
         values[f"analysis_{name}"] = dataset.analysis.get(name) or None
     values["photon_budget"] = dataset.light.photons
-    if dataset.truth is not None:
-        values |= _truth_arrays(dataset.truth)
+    truth = dataset.truth
+    if truth is not None:
+        values |= {f"truth_{name}": getattr(truth, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
+        values["object_keys"] = np.array(list(truth.names), dtype=np.int64)
+        values["object_names"] = np.array(list(truth.names.values()), dtype=np.str_)
+        if truth.photons is not None:
+            values["photon_object_id"] = truth.photons.object_id
+            values["photon_z_mm"] = truth.photons.z_mm
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)
     return content.getvalue()
 
 
-def write_shards(
+def _write_shards(
     collection: Collection, folder: Path, in_light: Callable[[Dataset], Dataset], report: Report
 ) -> None:
     """Write the tar files of a collection as WebDataset reads them, each split in shards of its own.
@@ -143,7 +126,7 @@ def write_shards(
         if not shards or shards[-1].stat().st_size >= SHARD_BYTES:
             shards.append(folder / f"{split}-{len(shards):06d}.tar")
         described = {name: row[name] for name in (*COLUMNS, "values")}
-        parts = {"npz": events_of(in_light(collection[number])), "json": json_bytes(described)}
+        parts = {"npz": _events_of(in_light(collection[number])), "json": json_bytes(described)}
         with tarfile.open(shards[-1], "a", format=tarfile.USTAR_FORMAT) as shard:
             for suffix, content in parts.items():
                 member = tarfile.TarInfo(f"{number:06d}.{suffix}")
@@ -152,78 +135,11 @@ def write_shards(
         report("datasets", done, len(collection))
 
 
-def _truth_arrays(truth: Truth) -> dict[str, np.ndarray | None]:
-    arrays = {f"truth_{name}": getattr(truth, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
-    arrays["object_keys"] = np.array(list(truth.names), dtype=np.int64)
-    arrays["object_names"] = np.array(list(truth.names.values()), dtype=np.str_)
-    if truth.photons is not None:
-        arrays["photon_object_id"] = truth.photons.object_id
-        arrays["photon_z_mm"] = truth.photons.z_mm
-    return arrays
-
-
-def write_photon_cubes(dataset: Dataset, folder: Path) -> None:
-    """Write a folder for each view, and what all have in common; memory grows with the photons alone.
-
-    Raises `InputError` for counts that are not of one bit, and for frames that the dataset did not keep.
-    """
-    events, frame_count = _binary_frames(dataset)
-    grid = dataset.grid
-    intrinsics, poses = intrinsics_of(dataset), frames_of(dataset)
-    principal_points = principal_points_px(dataset).reshape(-1, 2).tolist()
-    lens = {name: intrinsics[name] for name in ("fl_x", "fl_y", "w", "h")}
-    packing = {"c": 1, "cfa": dataset.cfa, "bitpack": True, "bitpack_dim": 2}
-    shape = (frame_count, grid.height, grid.width)
-    camera = events.k.astype(np.int64) * grid.cols + events.l
-    starts = np.searchsorted(camera, np.arange(grid.view_count + 1))
-    frames = []
-    for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
-        view = folder / view_name(grid, k, l)
-        view.mkdir()
-        photons = slice(starts[number], starts[number + 1])
-        _write_frames(view / FRAMES, shape, events.frame[photons], events.i[photons], events.j[photons])
-        x, y = principal_points[number]
-        pose = {"transform_matrix": poses[number]["transform_matrix"]}
-        alone = lens | {"cx": x, "cy": y} | packing | {"file_path": FRAMES, "frames": [pose] * frame_count}
-        (view / TRANSFORMS).write_text(json.dumps(alone, allow_nan=False) + "\n")
-        frames.append({"file_path": f"{view.name}/{FRAMES}"} | poses[number])
-    document = intrinsics | packing | {"num_frames": frame_count}
-    if dataset.light.photons is not None:
-        document["photon_budget"] = dataset.light.photons
-    (folder / TRANSFORMS).write_bytes(json_bytes(document | {"frames": frames}))
-
-
-def _binary_frames(dataset: Dataset) -> tuple[FrameEvents, int]:
-    """The single counts in the order of the views, and the number of frames."""
-    readout = dataset.counts.readout
-    if readout.bits != 1:
-        limit = "no limit" if readout.bits is None else f"{readout.bits} bits a frame"
-        raise InputError(f"{dataset.path}: its counts have {limit}, and a photon cube has frames of one bit")
-    events = dataset.counts.frame_events
-    if events is None:
-        raise InputError(
-            f"{dataset.path}: has sums of {readout.frames} frames, which were not kept; generate it with "
-            "products.frames = true"
-        )
-    return events, readout.frames
-
-
-def _write_frames(
-    path: Path, shape: tuple[int, int, int], frame: np.ndarray, i: np.ndarray, j: np.ndarray
-) -> None:
-    """Write frames (T, H, W) in which the pixels (i, j) of `frame` are set; the rest of the file is holes."""
-    frame_count, height, width = shape
-    rows = (frame_count, height, -(-width // 8))
-    cube = np.lib.format.open_memmap(path, "w+", np.uint8, rows)
-    np.bitwise_or.at(cube, (frame, i, j // 8), (128 >> (j % 8)).astype(np.uint8))
-    cube.flush()
-
-
-WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
+WRITERS: dict[Format, Callable[[Dataset, Path], object]] = {
     "hci": write_hci,
     "nerfstudio": write_nerfstudio,
     "photoncube": write_photon_cubes,
-    "events": write_events,
+    "events": lambda dataset, folder: (folder / "events.npz").write_bytes(_events_of(dataset)),
 }
 
 

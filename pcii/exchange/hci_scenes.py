@@ -12,21 +12,22 @@ p = sensor size / longer side of the image. The views of a grid with the shear s
 """
 
 import configparser
-import io
 import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pcii.base import InputError, Report, silent, visible
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
-from pcii.exchange.export_pictures import pictures_of, write_png
-from pcii.exchange.image_folders import KnownViews, import_images, listed_names
-from pcii.exchange.pixel_files import Encoding, decode, picture_of
-from pcii.exchange.stated_cameras import Note, Optics, warn
-from pcii.store import Dataset
+from pcii.exchange.elemental_images import KnownViews, import_images, listed_names
+from pcii.exchange.number_files import decode, picture_of
+from pcii.exchange.posed_exports import pictures_of, write_png
+from pcii.exchange.stated_images import Encoding, Note, Optics, warn
+from pcii.store import Dataset, first_fault
 from pcii.types import Truth
 
 PARAMETERS = "parameters.cfg"
@@ -37,8 +38,25 @@ README = "README.txt"
 INFINITY_M = 1e9
 """Focus distance of a grid without shear. The benchmark's own tools divide by the focus distance and multiply
 with it: infinity or 0 would make NaN of all disparities; this changes none by more than 1e-8 of itself."""
-LEAST_MM = 1e-6
-"""Of lengths that divide others."""
+Count = Annotated[int, Field(ge=1)]
+Length = Annotated[float, Field(ge=1e-6)]
+Disparity = Annotated[float, Field(allow_inf_nan=True)]
+
+
+class _Parameters(BaseModel):
+    """What parameters.cfg says of the cameras; a range of nan says nothing, by which exports say so."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    num_cams_x: Count
+    num_cams_y: Count
+    image_resolution_x_px: Count
+    image_resolution_y_px: Count
+    focal_length_mm: Length
+    baseline_mm: Length
+    sensor_size_mm: Length
+    focus_distance_m: Annotated[float, Field(ge=0)]
+    disp_min: Disparity = math.nan
+    disp_max: Disparity = math.nan
 
 
 def import_hci(
@@ -57,105 +75,75 @@ def import_hci(
     the names of files and parameters that are not used. Raises `InputError` for what is missing or wrong.
     """
     root = Path(folder)
-    known = _Parameters(root / PARAMETERS)
-    (rows, cols, height, width), optics = _stated_cameras(known)
+    stated = _read_parameters(root / PARAMETERS)
+    rows, cols = stated.num_cams_y, stated.num_cams_x
+    shape_HW = stated.image_resolution_y_px, stated.image_resolution_x_px
+    pixel_mm = stated.sensor_size_mm / max(shape_HW)
+    parallax_px_mm = stated.focal_length_mm * stated.baseline_mm / pixel_mm
+    focus_m = stated.focus_distance_m
+    shear_px = parallax_px_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
+    optics = Optics(
+        pitch_mm=(stated.baseline_mm, stated.baseline_mm),
+        focal_mm=stated.focal_length_mm,
+        pixel_mm=pixel_mm,
+        shear_px=(shear_px, shear_px),
+    )
+
+    def depth_mm(disparity_px: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return parallax_px_mm / (disparity_px.astype(np.float64) + shear_px)
+
     others: list[str] = []  # files that are no views are named with those of the benchmark
     options = {"encoding": encoding, "cfa": cfa, "report": report, "note": others.append}
     views = import_images(root, PATTERN, optics, grid=(rows, cols), **options)
-    if views.grid.shape_HW != (height, width):
+    if views.grid.shape_HW != shape_HW:
         raise InputError(
-            f"{root / PARAMETERS}: image_resolution is {height} x {width} px, and the views are "
+            f"{root / PARAMETERS}: image_resolution is {shape_HW[0]} x {shape_HW[1]} px, and the views are "
             f"{views.grid.height} x {views.grid.width}, rows x columns"
         )
-    z_range_mm = _range_mm(known, optics)
+    near, far = depth_mm(np.array([stated.disp_max, stated.disp_min])).tolist()
     maps = [name for name in (DEPTH, DISPARITY) if (root / name).is_file()]
     truth = None
     if maps and (rows % 2 == 0 or cols % 2 == 0):
         note(f"not used: {maps[0]}, of a view beside the centre of an even grid, {rows} x {cols}")
     elif maps:
-        truth = _true_depth(root / maps[0], (height, width), optics)
+        truth = _true_depth(root / maps[0], shape_HW, depth_mm)
         note(f"with the true depth of the virtual centre, {maps[0]}")
     files = {path.name for path in root.iterdir() if path.is_file()}
     unused = sorted(files - {PARAMETERS, *maps[:1]} - {*filter(VIEW.fullmatch, files)})
     if unused:
         note(f"not used: {listed_names(unused)}")
-    if known.texts:
-        note(f"not used of {PARAMETERS}: {listed_names([*known.texts])}")
-    return KnownViews(views, truth, z_range_mm)
+    if stated.model_extra:
+        note(f"not used of {PARAMETERS}: {listed_names([*stated.model_extra])}")
+    return KnownViews(views, truth, (near, far) if 0 < near < far < math.inf else None)
 
 
-def _stated_cameras(known: "_Parameters") -> tuple[tuple[int, ...], Optics]:
-    """Rows and columns of cameras, height and width of images; and the optics."""
-    names = ("num_cams_y", "num_cams_x", "image_resolution_y_px", "image_resolution_x_px")
-    shape = tuple(int(known.number(name, 1)) for name in names)
-    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
-    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(shape[2:])
-    focus_m = known.number("focus_distance_m")
-    shear = focal_mm * baseline_mm / pixel_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
-    pitch_mm, shear_px = (baseline_mm, baseline_mm), (shear, shear)
-    return shape, Optics(pitch_mm=pitch_mm, focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=shear_px)
-
-
-def _depth_mm(optics: Optics, disparity_px: np.ndarray) -> np.ndarray:
-    """Depths in mm of disparities in px; infinite for that of the shear."""
-    assert optics.pixel_mm is not None
-    parallax_px_mm = optics.focal_mm * optics.pitch_mm[0] / optics.pixel_mm
-    with np.errstate(divide="ignore"):
-        return parallax_px_mm / (np.asarray(disparity_px, np.float64) + optics.shear_px[0])
-
-
-def _range_mm(known: "_Parameters", optics: Optics) -> tuple[float, float] | None:
-    """Nearest and farthest depth; a missing end says nothing, nor does nan, by which exports say so."""
-    ends = [known.texts.pop(name, "nan") for name in ("disp_min", "disp_max")]
+def _read_parameters(path: Path) -> _Parameters:
+    if not path.is_file():
+        raise InputError(f"{path}: missing; the benchmark's folders have it")
+    parser = configparser.ConfigParser(interpolation=None, strict=False, inline_comment_prefixes=("#", ";"))
     try:
-        far, near = (float(_depth_mm(optics, np.array(float(end)))) for end in ends)
-    except ValueError:
-        raise InputError(f"{known.path}: disp_min, disp_max: expected numbers of pixels") from None
-    return (near, far) if 0 < near < far < math.inf else None
+        parser.read_string(path.read_bytes().decode("utf-8-sig", "replace"))
+        values = {name: text for section in parser.sections() for name, text in parser[section].items()}
+        return _Parameters.model_validate(values)
+    except configparser.Error as fault:
+        sentence = visible(" ".join(str(fault).split()))
+        raise InputError(f"{path}: not a file of parameters ({sentence})") from None
+    except ValidationError as fault:
+        raise InputError(f"{path}: {first_fault(fault)}") from None
 
 
-def _true_depth(path: Path, shape_HW: tuple[int, int], optics: Optics) -> Truth:
+def _true_depth(path: Path, shape_HW: tuple[int, int], depth_mm: Callable[[np.ndarray], np.ndarray]) -> Truth:
     """The truth of a map of depth or disparity; `InputError`, naming it, for another size or wrong depths."""
     picture = picture_of(path, ["PFM"])
     if picture.shape[:2] != shape_HW:
         raise InputError(f"{path}: is {picture.layout()}, and the views {shape_HW[0]} x {shape_HW[1]} px")
-    numbers = next(decode(picture))[..., 0].astype(np.float64)
-    z_mm = 1000 * numbers if path.name == DEPTH else _depth_mm(optics, numbers)
+    numbers = decode(picture)[0, ..., 0].astype(np.float64)
+    z_mm = 1000 * numbers if path.name == DEPTH else depth_mm(numbers)
     is_depth = (z_mm >= NEAREST_MM) & (z_mm <= FARTHEST_MM)
     if not (is_depth | np.isposinf(z_mm)).all():  # NaN, or bytes in wrong order
         raise InputError(f"{path}: holds depths that are not between 0.1 mm and 100 km")
     return Truth(z_mm.astype(np.float32), np.zeros(z_mm.shape, np.int16), {}, are_objects_known=False)
-
-
-class _Parameters:
-    """The numbers of a parameters.cfg; `texts` are those by name that were not read."""
-
-    def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise InputError(f"{path}: missing; the benchmark's folders have it")
-        parser = configparser.ConfigParser(
-            interpolation=None, strict=False, inline_comment_prefixes=("#", ";")
-        )
-        try:
-            parser.read_string(path.read_bytes().decode("utf-8-sig", "replace"))
-        except configparser.Error as fault:
-            sentence = visible(" ".join(str(fault).split()))
-            raise InputError(f"{path}: not a file of parameters ({sentence})") from None
-        self.path = path
-        self.texts = {name: text for section in parser.sections() for name, text in parser[section].items()}
-
-    def number(self, name: str, least: float = 0.0) -> float:
-        """A number of at least `least`."""
-        text = self.texts.pop(name, "nothing")
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if not least <= number < math.inf:
-            raise InputError(
-                f"{self.path}: {name}: expected a number of at least {least:g}, got {visible(text)}"
-            )
-        return number
 
 
 def write_hci(dataset: Dataset, folder: Path) -> None:
@@ -171,22 +159,31 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
             f"{dataset.path}: shear_px: the HCI layout has a focus distance, and views sheared by "
             f"{shear_px:g} px have none; export nerfstudio or events"
         )
-    pictures = pictures_of(dataset)
+    picture, _, meaning = pictures_of(dataset)
     digits = max(3, len(str(grid.view_count - 1)))
     names = {(k, l): f"Cam{k * grid.cols + l:0{digits}d}" for k, l in np.ndindex(grid.rows, grid.cols)}
     for (k, l), name in names.items():
-        write_png(folder / f"input_{name}.png", pictures.view(k, l))
+        write_png(folder / f"input_{name}.png", picture(k, l))
 
     def disparity_px(z_mm: np.ndarray) -> np.ndarray:
         return baseline_mm * grid.focal_mm / (z_mm.astype(np.float64) * grid.pixel_mm) - shear_px
 
-    for suffix, z_mm in _depth_maps_mm(dataset, names).items():
-        _write_pfm(folder / f"gt_depth_lowres{suffix}.pfm", z_mm / 1000)
-        _write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
+    maps: dict[str, np.ndarray] = {}
+    if not dataset.has_truth_array("camera_position_mm"):  # errors of calibration, which the layout has not
+        if dataset.has_truth_array("view_z_mm"):
+            view_z_mm = dataset.truth_array("view_z_mm")
+            maps = {f"_{name}": view_z_mm[camera] for camera, name in names.items()}
+        if dataset.truth is not None and grid.rows % 2 and grid.cols % 2:
+            maps[""] = dataset.truth.z_mm
+    for suffix, z_mm in maps.items():
+        for kind, values in (("depth", z_mm / 1000), ("disp", disparity_px(z_mm))):
+            # Debevec's PFM: rows from the bottom to the top, the scale -1 for little endian.
+            content = f"Pf\n{grid.width} {grid.height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes()
+            (folder / f"gt_{kind}_lowres{suffix}.pfm").write_bytes(content)
     (folder / PARAMETERS).write_text(_parameters(dataset, baseline_mm, shear_px, disparity_px))
     (folder / README).write_text(
         f"{visible(dataset.name)}: {grid.rows} x {grid.cols} integral images, row by row from the top left.\n"
-        f"Pixels are {pictures.meaning}.\nDepth is planar, infinite where nothing is hit; X points right, Y "
+        f"Pixels are {meaning}.\nDepth is planar, infinite where nothing is hit; X points right, Y "
         f"down, Z forward. A focus_distance_m of {INFINITY_M:g} stands for views that are not shifted.\n"
     )
 
@@ -203,19 +200,6 @@ def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> flo
     return (values or pair)[0]
 
 
-def _depth_maps_mm(dataset: Dataset, names: dict[tuple[int, int], str]) -> dict[str, np.ndarray]:
-    """Maps of depth (H, W) by the suffix of their files; none of cameras that have errors of calibration."""
-    maps: dict[str, np.ndarray] = {}
-    if dataset.has_truth_array("camera_position_mm"):
-        return maps
-    if dataset.has_truth_array("view_z_mm"):
-        z_mm = dataset.truth_array("view_z_mm")
-        maps = {f"_{name}": z_mm[camera] for camera, name in names.items()}
-    if dataset.truth is not None and dataset.grid.rows % 2 and dataset.grid.cols % 2:
-        maps[""] = dataset.truth.z_mm
-    return maps
-
-
 def _parameters(
     dataset: Dataset, baseline_mm: float, shear_px: float, disparity_px: Callable[[np.ndarray], np.ndarray]
 ) -> str:
@@ -224,48 +208,43 @@ def _parameters(
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
     lens = recipe.get("grid", {}).get("lens")
     lowest, highest = _range_px(dataset, disparity_px)
-    values = {
-        "intrinsics": {
-            "focal_length_mm": grid.focal_mm,
-            "image_resolution_x_px": grid.width,
-            "image_resolution_y_px": grid.height,
-            "sensor_size_mm": grid.pixel_mm * max(grid.width, grid.height),
-            "fstop": grid.focal_mm / lens["aperture_mm"] if lens else math.inf,
-        },
-        "extrinsics": {
-            "num_cams_x": grid.cols,
-            "num_cams_y": grid.rows,
-            "baseline_mm": baseline_mm,
-            "focus_distance_m": focus_m,
-            "center_cam_x_m": 0.0,
-            "center_cam_y_m": 0.0,
-            "center_cam_z_m": 0.0,
-            # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down.
-            "center_cam_rx_rad": math.pi,
-            "center_cam_ry_rad": 0.0,
-            "center_cam_rz_rad": 0.0,
-            "offset": shear_px,
-        },
-        "meta": {
-            "scene": re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name),
-            "category": "additional",
-            "date": "",
-            "version": "",
-            "authors": "",
-            "contact": "",
-            "cycles_seed": recipe.get("seed") or 0,
-            "disp_min": lowest,
-            "disp_max": highest,
-            "frustum_disp_min": lowest,
-            "frustum_disp_max": highest,
-            "depth_map_scale": 1.0,
-        },
-    }
-    parser = configparser.ConfigParser(delimiters="=", interpolation=None)
-    parser.read_dict(values)
-    text = io.StringIO()
-    parser.write(text)
-    return text.getvalue()
+    scene = re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name)
+    # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down: turned by pi about X.
+    return f"""[intrinsics]
+focal_length_mm = {grid.focal_mm}
+image_resolution_x_px = {grid.width}
+image_resolution_y_px = {grid.height}
+sensor_size_mm = {grid.pixel_mm * max(grid.width, grid.height)}
+fstop = {grid.focal_mm / lens["aperture_mm"] if lens else math.inf}
+
+[extrinsics]
+num_cams_x = {grid.cols}
+num_cams_y = {grid.rows}
+baseline_mm = {baseline_mm}
+focus_distance_m = {focus_m}
+center_cam_x_m = 0.0
+center_cam_y_m = 0.0
+center_cam_z_m = 0.0
+center_cam_rx_rad = {math.pi}
+center_cam_ry_rad = 0.0
+center_cam_rz_rad = 0.0
+offset = {shear_px}
+
+[meta]
+scene = {scene}
+category = additional
+date = {""}
+version = {""}
+authors = {""}
+contact = {""}
+cycles_seed = {recipe.get("seed") or 0}
+disp_min = {lowest}
+disp_max = {highest}
+frustum_disp_min = {lowest}
+frustum_disp_max = {highest}
+depth_map_scale = 1.0
+
+"""
 
 
 def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
@@ -278,13 +257,3 @@ def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]
         return math.nan, math.nan
     disparities = disparity_px(np.asarray(depths_mm))
     return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
-
-
-def _write_pfm(path: Path, values: np.ndarray) -> None:
-    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
-
-    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
-    """
-    height, width = values.shape
-    header = f"Pf\n{width} {height}\n-1\n".encode()
-    path.write_bytes(header + values[::-1].astype("<f4").tobytes())

@@ -4,19 +4,18 @@ The frames of a transforms.json may be in any order and the rig anywhere in the 
 those of the pictures.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pcii.base import InputError, Report, silent
-from pcii.exchange.array_files import open_array
 from pcii.exchange.count_arrays import import_counts
-from pcii.exchange.export_pictures import MM_PER_M
-from pcii.exchange.frame_formats import AS_COUNTED, FrameFormat
-from pcii.exchange.image_folders import radiance_of_files, views_of
-from pcii.exchange.pixel_files import Encoding
-from pcii.exchange.stated_cameras import Note, warn
+from pcii.exchange.elemental_images import import_images
+from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
+from pcii.exchange.number_files import open_array
+from pcii.exchange.posed_exports import MM_PER_M
+from pcii.exchange.stated_images import Encoding, Note, warn
 from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
 from pcii.types import CameraGrid, PhotonCounts, Views
 
@@ -33,21 +32,6 @@ USUAL_PIXEL_MM = 0.005
 """Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseGrid:
-    """Which frame is which camera, and what poses and principal points say of the grid.
-
-    An axis with one camera has the pitch of the other; a single camera has 1 mm.
-    """
-
-    numbers: np.ndarray
-    """Number of the frame that is camera (k, l), (K, L) int: rows from the top, columns from the left."""
-    pitch_mm: tuple[float, float]
-    shear_px: tuple[float, float]
-    offset_px: tuple[float, float]
-    """By how much further right and down than the film's middle the axes meet it, of all cameras alike."""
-
-
 def import_posed_pictures(
     source: str | Path,
     *,
@@ -62,21 +46,12 @@ def import_posed_pictures(
     """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
 
     The file has the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
-    says how large the film is. Whole numbers are sRGB and floats linear, unless `encoding` says otherwise;
-    `cfa` is a Bayer pattern, of which grey pictures are mosaics. Raises `InputError`, naming file and member,
-    frame or picture, for what is missing, wrong, or no such grid.
+    says how large the film is. For `encoding` and `cfa` see `import_images`. Raises `InputError`, naming file
+    and member, frame or picture, for what is missing, wrong, or no such grid.
     """
     file = read_transforms(source, note=note)
-    poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
-    files = np.array(file.file_paths, object)[poses.numbers]
-    radiance = radiance_of_files(files, encoding, report, note)
-    if radiance.shape[2:4] != grid.shape_HW:
-        raise InputError(
-            f"{files[0, 0]}: is {radiance.shape[2]} x {radiance.shape[3]} px, where {file.path.name} says "
-            f"{grid.height} x {grid.width}, rows x columns"
-        )
-    return views_of(radiance, grid, cfa)
+    grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
+    return import_images(files, None, grid, encoding=encoding, cfa=cfa, report=report, note=note)
 
 
 def import_posed_cubes(
@@ -101,70 +76,36 @@ def import_posed_cubes(
     file = read_transforms(source, note=note)
     if file.cfa is not None and cfa not in (None, file.cfa):
         raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
-    poses = find_grid(file)
-    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, note)
-    paths = np.array(file.file_paths, object)[poses.numbers]
-    first = open_array(paths[0, 0])
+    grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
+    first = open_array(files[0, 0])
     channels = first.shape[3] if first.ndim == 4 else 1
     if file.channels not in (None, channels):
-        raise InputError(f"{file.path}: c: is {file.channels}, and {paths[0, 0]} has {channels} channels")
+        raise InputError(f"{file.path}: c: is {file.channels}, and {files[0, 0]} has {channels} channels")
     if stored.bitpack or file.is_bitpacked:
         stored = replace(stored, bitpack=True, width=grid.width)
     options = {"cfa": file.cfa or cfa, "frames": frames, "report": report, "note": note}
-    return import_counts(paths, grid, stored=stored, **options)
+    return import_counts(files, grid, stored=stored, **options)
 
 
-def camera_grid_of(
+def find_grid(
     file: TransformsFile,
-    poses: PoseGrid,
-    focal_mm: float | None,
-    pixel_mm: float | None,
-    sensor_mm: float | None,
+    focal_mm: float | None = None,
+    pixel_mm: float | None = None,
+    sensor_mm: float | None = None,
     note: Note = warn,
-) -> CameraGrid:
-    """The camera grid in mm: poses give pitch and shear, one length of the film the others.
+) -> tuple[CameraGrid, np.ndarray]:
+    """The grid of the frames of a file, in whichever order they are, and the file of each camera, (K, L).
 
-    Raises `InputError` for more than one length of the film.
+    Pitch and shear are fitted by least squares; an axis with one camera has the pitch of the other, a single
+    camera has 1 mm. One length of the film gives the others. Raises `InputError` for more than one, and for
+    cameras that are no such grid, with the frame that is off most.
     """
-    lengths = [length for length in (focal_mm, pixel_mm, sensor_mm) if length is not None]
-    if len(lengths) > 1:
-        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
-    if focal_mm is not None:
-        pixel_mm = focal_mm / file.focal_px
-    else:
-        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
-        focal_mm = _digits(file.focal_px * pixel_mm)
-    if not lengths:
-        note(
-            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
-            "its ratio, and nothing else of them matters"
-        )
-    if any(poses.offset_px):
-        x, y = poses.offset_px
-        note(
-            f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
-            "below it, alike in all: sections and depth are in the frame of the pictures"
-        )
-    rows, cols = poses.numbers.shape
-    return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=poses.pitch_mm,
-        focal_mm=focal_mm,
-        pixel_mm=pixel_mm,
-        height=file.height,
-        width=file.width,
-        shear_px=poses.shear_px,
-    )
+    from scipy.spatial import KDTree
 
-
-def find_grid(file: TransformsFile) -> PoseGrid:
-    """The grid of the frames of a file, in whichever order they are, fitted by least squares.
-
-    Raises `InputError` for cameras that are no such grid, with the frame that is off most.
-    """
     place_mm = _places_in_common_frame(file)
-    col, row = (_groups_of(values, _nearest_mm(place_mm) / 4) for values in place_mm[:2])
+    distances, _ = KDTree(place_mm[:2].T).query(place_mm[:2].T, k=2)  # the nearest is the camera itself
+    nearest_mm = np.median(np.asarray(distances)[:, 1])  # infinite for a single camera
+    col, row = (_groups_of(values, nearest_mm / 4) for values in place_mm[:2])
     count, cols, rows = len(file.poses), col.max() + 1, row.max() + 1
     numbers = np.full((rows, cols), -1)
     numbers[row, col] = np.arange(count)
@@ -174,40 +115,64 @@ def find_grid(file: TransformsFile) -> PoseGrid:
             f"{file.path}: frames: {count} cameras do not stand one at each place of a plane grid, here of "
             f"{rows} x {cols}; {file.frame_name(int(loneliest))} has the fewest in line with it"
         )
-    steps = col - (cols - 1) / 2, row - (rows - 1) / 2, np.zeros(count)
-    places = [_fit_line(step, values) for step, values in zip(steps, place_mm, strict=True)]
-    pitch = places[0][1] or places[1][1] or 1.0, places[1][1] or places[0][1] or 1.0
-    off_mm = np.stack([off for *_, off in places])
+    right, down = col - (cols - 1) / 2, row - (rows - 1) / 2
+    steps = np.stack([right, down, np.zeros(count), right, down])
+    from_middle_px = file.centres_px - np.array([file.width, file.height]) / 2
+    values = np.vstack([place_mm, from_middle_px.T])
+    means, slopes = values.mean(axis=1), (steps * values).sum(axis=1)
+    slopes /= np.maximum((steps**2).sum(axis=1), 0.5)  # of two cameras it is 0.5, of one 0
+    off = values - means[:, None] - slopes[:, None] * steps
+    pitch = slopes[0] or slopes[1] or 1.0, slopes[1] or slopes[0] or 1.0
     side_px = max(file.width, file.height)
-    nearest_mm = file.focal_px * min(pitch) / (NEAREST_SHARE * side_px)
-    moved_px = (file.focal_px * np.hypot(*off_mm[:2]) + side_px / 2 * np.abs(off_mm[2])) / nearest_mm
-    _check_moved(file, moved_px, np.linalg.norm(off_mm, axis=0), "mm from its place in a plane grid")
-    from_middle = (file.centres_px - np.array([file.width, file.height]) / 2).T
-    centres = [_fit_line(step, values) for step, values in zip(steps[:2], from_middle, strict=True)]
-    off_px = np.hypot(centres[0][2], centres[1][2])
+    nearest_z_mm = file.focal_px * min(pitch) / (NEAREST_SHARE * side_px)
+    moved_px = (file.focal_px * np.hypot(off[0], off[1]) + side_px / 2 * np.abs(off[2])) / nearest_z_mm
+    _check_moved(file, moved_px, np.linalg.norm(off[:3], axis=0), "mm from its place in a plane grid")
+    off_px = np.hypot(off[3], off[4])
     _check_moved(file, off_px, off_px, "px from where cx and cy of a grid with one shear would be")
-    (offset_x, shear_x, _), (offset_y, shear_y, _) = centres
-    return PoseGrid(
-        numbers,
+    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
+    if missing < 2:
+        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
+    if focal_mm is not None:
+        pixel_mm = focal_mm / file.focal_px
+    else:
+        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
+        focal_mm = _digits(file.focal_px * pixel_mm)
+    if missing == 3:
+        note(
+            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
+            "its ratio, and nothing else of them matters"
+        )
+    x, y = _digits(means[3]), _digits(means[4])
+    if x or y:
+        note(
+            f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
+            "below it, alike in all: sections and depth are in the frame of the pictures"
+        )
+    grid = CameraGrid(
+        rows=int(rows),
+        cols=int(cols),
         pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
-        shear_px=(_digits(shear_x), _digits(shear_y)),
-        offset_px=(_digits(offset_x), _digits(offset_y)),
+        focal_mm=focal_mm,
+        pixel_mm=pixel_mm,
+        height=file.height,
+        width=file.width,
+        shear_px=(_digits(slopes[3]), _digits(slopes[4])),
     )
+    return grid, np.array(file.file_paths, object)[numbers]
 
 
 def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
     """Places (3, N) in mm to the right, down and forward in the mean orientation of the cameras."""
-    turns = file.poses[:, :3, :3]
-    left, _, right = np.linalg.svd(turns.mean(axis=0))
-    common = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    # |A - B| of two rotations is 2 sqrt(2) sin(angle / 2), exact for small angles too.
-    chord = np.linalg.norm(turns - common, axis=(1, 2)) / np.sqrt(8)
-    angle = 2 * np.arcsin(np.minimum(chord, 1))
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(file.poses[:, :3, :3])
+    common = turns.mean().inv()
+    angle = (common * turns).magnitude()
     corner_px = np.hypot(file.width, file.height) / 2
     moved_px = angle * (file.focal_px + corner_px**2 / file.focal_px)
     _check_moved(file, moved_px, np.degrees(angle), "degrees turned from the mean orientation")
     place_mm = MM_PER_M * (file.poses[:, :3, 3] - file.poses[:, :3, 3].mean(axis=0))
-    return (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
+    return common.apply(place_mm).T * np.array([[1.0], [-1.0], [-1.0]])
 
 
 def _check_moved(file: TransformsFile, moved_px: np.ndarray, off: np.ndarray, what: str) -> None:
@@ -220,28 +185,12 @@ def _check_moved(file: TransformsFile, moved_px: np.ndarray, off: np.ndarray, wh
         )
 
 
-def _nearest_mm(place_mm: np.ndarray) -> float:
-    """Median distance from a camera to the nearest other one in the plane; infinite for a single camera."""
-    from scipy.spatial import KDTree
-
-    if place_mm.shape[1] == 1:
-        return np.inf
-    distances, _ = KDTree(place_mm[:2].T).query(place_mm[:2].T, k=2)  # the nearest is the camera itself
-    return float(np.median(np.asarray(distances)[:, 1]))
-
-
 def _groups_of(values: np.ndarray, apart: float) -> np.ndarray:
     """Number (N,) of the group of each value; groups have gaps of more than `apart` between them."""
     order = np.argsort(values)
     groups = np.empty(values.size, np.int64)
     groups[order] = np.cumsum(np.diff(values[order], prepend=values.min()) > apart)
     return groups
-
-
-def _fit_line(step: np.ndarray, values: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Mean, slope and residuals of values (N,) over steps, whose mean is 0, by least squares."""
-    slope = float(step @ values / max(step @ step, 0.5))
-    return float(values.mean()), slope, values - values.mean() - slope * step
 
 
 def _digits(value: float) -> float:

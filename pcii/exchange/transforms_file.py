@@ -8,20 +8,22 @@ Y up, looking along -Z, in metres.
 
 import json
 import math
-from collections.abc import Iterable
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pcii.base import InputError, visible
-from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
-from pcii.exchange.image_folders import VIEWS
-from pcii.exchange.pixel_files import picture_of
-from pcii.exchange.stated_cameras import Note, warn
+from pcii.exchange.number_files import VIEWS, picture_of
+from pcii.exchange.posed_exports import TRANSFORMS
+from pcii.exchange.stated_images import Note, warn
+from pcii.store import first_fault
 
+MOST_POSES = 1 << 16
+"""Frames of a file: a photon cube of visionsim has a pose for each of its frames, a thousand or more."""
 MOST_PX = 0.1
 """What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""
 MOST_SKEW = 1e-4
@@ -31,7 +33,7 @@ ROUNDING = 1e-9
 """Of numbers that are equal: metres, parts of a rotation, pixels."""
 PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 """Values of camera_model that, without distortion, are pinholes."""
-DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye")
+DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye", "distortion_params")
 FOCAL = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
 """Endings that NeRF's own files leave out of the names of pictures."""
@@ -39,6 +41,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)] | None
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 Pixels = Annotated[int, Field(ge=1, le=1 << 20)] | None
+Row = tuple[Number, Number, Number, Number]
 
 
 class _Lens(BaseModel):
@@ -54,21 +57,11 @@ class _Lens(BaseModel):
     camera_angle_x: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_angle_y: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_model: str | None = None
-    is_fisheye: bool | None = None
-    k1: Number | None = None
-    k2: Number | None = None
-    k3: Number | None = None
-    k4: Number | None = None
-    k5: Number | None = None
-    k6: Number | None = None
-    p1: Number | None = None
-    p2: Number | None = None
-    distortion_params: list[Number] | None = None
 
 
 class _Frame(_Lens):
     file_path: str | None = None
-    transform_matrix: list[list[Number]]
+    transform_matrix: Annotated[list[Row], Field(min_length=3, max_length=4)]
 
 
 class _Document(_Lens):
@@ -108,13 +101,6 @@ class TransformsFile:
         return visible(self.file_paths[number].relative_to(self.path.parent).as_posix())
 
 
-def transforms_in(source: Path) -> Path | None:
-    """The file to read if `source` is a .json file or a folder with a transforms.json, else None."""
-    if source.suffix == ".json" and source.is_file():
-        return source
-    return source / TRANSFORMS if (source / TRANSFORMS).is_file() else None
-
-
 def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     """Read a transforms.json of anybody, or that of a folder.
 
@@ -125,8 +111,14 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     length, matrices that are no poses, paths that are used twice or lead out of the folder, photon cubes that
     are not packed along the width, and a single cube whose camera moves.
     """
-    file = transforms_in(Path(path)) or Path(path)
-    document = _parsed(file)
+    file = Path(path) / TRANSFORMS if Path(path).is_dir() else Path(path)
+    content = file.read_bytes()
+    try:
+        document = _Document.model_validate(json.loads(content))
+    except ValidationError as fault:
+        raise InputError(f"{file}: {first_fault(fault)}") from None
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
     frames, is_single_cube = document.frames, document.file_path is not None
     paths = _paths(file, document)
     has_cubes = is_single_cube or document.bitpack is True or any(path.suffix == ".npy" for path in paths)
@@ -139,15 +131,16 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
             raise InputError(f"{file}: w, h: missing; the width and height of the frames in pixels")
         document.h, document.w, _ = picture_of(paths[0], VIEWS).shape
     (width, height, focal_px), centres_px = _common_lens(file, document)
-    poses = np.stack([_pose(file, n, frame.transform_matrix) for n, frame in enumerate(frames)])
+    poses = _poses(file, frames)
     poses[:, :3, 3] /= document.applied_scale or 1
     if is_single_cube:
         if np.ptp(poses, axis=0).max() + np.ptp(centres_px, axis=0).max() > ROUNDING:
             raise InputError(f"{file}: frames: the camera moves, and a moving camera is no grid")
         poses, centres_px = poses[:1], centres_px[:1]
-    unused = {**(document.model_extra or {}), **{name: 0 for f in frames for name in f.model_extra or {}}}
+    extras = [name for lens in (document, *frames) for name in lens.model_extra or {}]
     if not has_cubes:
-        unused |= {name: 0 for name in ("cfa", "c") if getattr(document, name) is not None}
+        extras += [name for name in ("cfa", "c") if getattr(document, name) is not None]
+    unused = [name for name in dict.fromkeys(extras) if name not in DISTORTIONS]
     if unused:
         note(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
     return TransformsFile(
@@ -165,101 +158,96 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     )
 
 
-def _parsed(file: Path) -> _Document:
-    """The document of a file; `InputError` with the first member that is wrong."""
-    try:
-        return _Document.model_validate(json.loads(file.read_bytes()))
-    except ValidationError as fault:
-        first = fault.errors()[0]
-        place = ".".join(str(step) for step in first["loc"])
-        raise InputError(f"{file}: {place or 'the file'}: {visible(first['msg'])}") from None
-    except (ValueError, RecursionError) as fault:
-        raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
-
-
 def _paths(file: Path, document: _Document) -> tuple[Path, ...]:
-    """The picture or cube of each frame, or that of a single camera; `InputError` for one of two frames."""
-    if document.file_path is not None:
-        return (_path(file, "file_path", document.file_path),)
-    frames = enumerate(document.frames)
-    paths = tuple(_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in frames)
-    if len({*paths}) < len(paths):
-        name = next(one for one in paths if paths.count(one) > 1).relative_to(file.parent)
-        raise InputError(f"{file}: frames: {name.as_posix()} is the file_path of two of them")
-    return paths
+    """The picture or cube of each frame, or that of a single camera; without its ending if that is found.
 
-
-def _path(file: Path, member: str, text: str | None) -> Path:
-    """The file that a member names, in the folder; without its ending if that is found."""
-    inside = PurePosixPath((text or "").replace("\\", "/"))
-    folder = file.parent.resolve()
-    is_inside = bool(inside.parts) and not inside.is_absolute() and ".." not in inside.parts
-    if not is_inside or "\0" in str(inside) or not (folder / inside).resolve().is_relative_to(folder):
-        raise InputError(f"{file}: {member}: expected a path inside the folder such as images/00_00.png")
-    path = file.parent / inside
-    endings = (path.with_name(path.name + ending) for ending in ENDINGS)
-    return path if path.exists() else next((other for other in endings if other.is_file()), path)
+    Raises `InputError` for a path that leads out of the folder, and for one of two frames.
+    """
+    members = {"file_path": document.file_path}
+    if document.file_path is None:
+        members = {f"frames.{n}.file_path": frame.file_path for n, frame in enumerate(document.frames)}
+    folder, paths = file.parent.resolve(), []
+    for member, text in members.items():
+        inside = PurePosixPath((text or "").replace("\\", "/"))
+        is_plain = bool(inside.parts) and not inside.is_absolute() and "\0" not in str(inside)
+        if not is_plain or not (folder / inside).resolve().is_relative_to(folder):
+            raise InputError(f"{file}: {member}: expected a path inside the folder such as images/00_00.png")
+        path = file.parent / inside
+        if not path.exists():
+            endings = (path.with_name(path.name + ending) for ending in ENDINGS)
+            path = next((other for other in endings if other.is_file()), path)
+        paths.append(path)
+    (path, count), *_ = Counter(paths).most_common(1)
+    if count > 1:
+        name = path.relative_to(file.parent).as_posix()
+        raise InputError(f"{file}: frames: {name} is the file_path of {count} of them")
+    return tuple(paths)
 
 
 def _common_lens(file: Path, document: _Document) -> tuple[tuple[int, int, float], np.ndarray]:
     """Width, height and focal length in px, alike in all frames, and their principal points (N, 2)."""
-    lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(document.frames)]
-    width, height, focal_px, _ = lenses[0]
-    for number, (w, h, f, _) in enumerate(lenses):
-        if (w, h) != (width, height) or abs(f - focal_px) * max(w, h) / 2 > MOST_PX * focal_px:
+    top = document.model_dump(exclude={"frames"}, exclude_none=True)
+    first, centres = None, []
+    for number, frame in enumerate(document.frames):
+        own = frame.model_dump(exclude_none=True)
+        stated, place = top | own, f"frames.{number}"
+        if any(np.any(stated.get(name, 0)) for name in DISTORTIONS):
             raise InputError(
-                f"{file}: frames.{number}: {h} x {w} px and a focal length of {f:g} px, where the first "
-                f"frame has {height} x {width} and {focal_px:g}; cameras of a grid are alike"
+                f"{file}: {place}: the lens distorts (k1, is_fisheye ...); undistort the pictures"
             )
-    return (width, height, focal_px), np.array([centre for *_, centre in lenses])
+        if stated.get("camera_model", "PINHOLE") not in PINHOLES:
+            raise InputError(
+                f"{file}: camera_model: expected one of {', '.join(PINHOLES)}; pictures of other lenses are "
+                "undistorted first"
+            )
+        width, height = stated["w"], stated["h"]
+        focal_px = _focal_px(file, own if any(name in own for name in FOCAL) else top, width, height)
+        first = first or (width, height, focal_px)
+        is_other_focal = abs(focal_px - first[2]) * max(width, height) / 2 > MOST_PX * first[2]
+        if (width, height) != first[:2] or is_other_focal:
+            raise InputError(
+                f"{file}: {place}: {height} x {width} px and a focal length of {focal_px:g} px, where the "
+                f"first frame has {first[1]} x {first[0]} and {first[2]:g}; cameras of a grid are alike"
+            )
+        centres.append((stated.get("cx", width / 2), stated.get("cy", height / 2)))
+    assert first is not None
+    return first, np.array(centres)
 
 
-def _lens(file: Path, place: str, top: _Lens, frame: _Lens) -> tuple[int, int, float, tuple[float, float]]:
-    """Width, height, focal length and principal point (x, y) of a frame, in px."""
-    stated = top.model_dump(include={*_Lens.model_fields}) | frame.model_dump(
-        include={*_Lens.model_fields}, exclude_unset=True, exclude_none=True
-    )
-    if any(stated[name] for name in DISTORTIONS) or any(stated["distortion_params"] or ()):
-        raise InputError(f"{file}: {place}: the lens distorts (k1, is_fisheye ...); undistort the pictures")
-    if stated["camera_model"] not in (None, *PINHOLES):
-        raise InputError(
-            f"{file}: camera_model: expected one of {', '.join(PINHOLES)}; pictures of other lenses are "
-            "undistorted first"
-        )
+def _focal_px(file: Path, lens: dict[str, Any], width: int, height: int) -> float:
+    """Focal length in px, from that of either axis or an angle of view."""
     focal_px: list[float] = []
-    lens = frame if any(getattr(frame, name) for name in FOCAL) else top
-    for axis, size in (("x", stated["w"]), ("y", stated["h"])):
-        length, angle = getattr(lens, f"fl_{axis}"), getattr(lens, f"camera_angle_{axis}")
-        if length or angle:
-            focal_px.append(length or size / 2 / math.tan(angle / 2))
+    for axis, size in (("x", width), ("y", height)):
+        if f"fl_{axis}" in lens:
+            focal_px.append(lens[f"fl_{axis}"])
+        elif f"camera_angle_{axis}" in lens:
+            focal_px.append(size / 2 / math.tan(lens[f"camera_angle_{axis}"] / 2))
     if not focal_px:
         raise InputError(f"{file}: fl_x: missing; the focal length in pixels, or camera_angle_x")
     across, down = focal_px[0], focal_px[-1]
-    width, height = stated["w"], stated["h"]
     if abs(across - down) * max(width, height) / 2 > MOST_PX * across:
         raise InputError(
             f"{file}: fl_y: is {down:g} where fl_x is {across:g}; pixels that are not square are resampled"
         )
-    x, y = (
-        size / 2 if stated[name] is None else stated[name] for name, size in (("cx", width), ("cy", height))
-    )
-    return width, height, across, (x, y)
+    return across
 
 
-def _pose(file: Path, number: int, rows: Iterable[list[float]]) -> np.ndarray:
-    """The checked matrix (4, 4) of a frame, its rotation the nearest exact one."""
-    member = f"{file}: frames.{number}.transform_matrix"
-    matrix = [list(row) for row in rows]
-    matrix += [[0.0, 0.0, 0.0, 1.0]] * (len(matrix) == 3)  # which some leave out
-    if [len(row) for row in matrix] != [4] * 4 or matrix[3] != [0, 0, 0, 1]:
-        raise InputError(f"{member}: expected four rows of four numbers, the last one 0 0 0 1")
-    pose = np.array(matrix, np.float64)
-    left, lengths, right = np.linalg.svd(pose[:3, :3])
+def _poses(file: Path, frames: list[_Frame]) -> np.ndarray:
+    """The checked matrices (N, 4, 4) of frames, whose rotations are the nearest exact ones."""
+    for number, frame in enumerate(frames):
+        if frame.transform_matrix[3:] not in ([], [(0, 0, 0, 1)]):  # some leave the last row out
+            raise InputError(f"{file}: frames.{number}.transform_matrix: expected 0 0 0 1 as its last row")
+    poses = np.tile(np.eye(4), (len(frames), 1, 1))
+    poses[:, :3] = [frame.transform_matrix[:3] for frame in frames]
+    left, lengths, right = np.linalg.svd(poses[:, :3, :3])
     exact = left @ right
-    if np.abs(lengths - 1).max() > MOST_SKEW or np.linalg.det(exact) < 0:
+    is_skew = (np.abs(lengths - 1).max(axis=1) > MOST_SKEW) | (np.linalg.det(exact) < 0)
+    if is_skew.any():
+        number = int(np.argmax(is_skew))
         raise InputError(
-            f"{member}: is no rotation; expected columns of length 1 at right angles (they scale by "
-            f"{lengths.min():.6g} to {lengths.max():.6g}) and a determinant above 0"
+            f"{file}: frames.{number}.transform_matrix: is no rotation; expected columns of length 1 at "
+            f"right angles (they scale by {lengths[number].min():.6g} to {lengths[number].max():.6g}) and a "
+            "determinant above 0"
         )
-    pose[:3, :3] = exact
-    return pose
+    poses[:, :3, :3] = exact
+    return poses

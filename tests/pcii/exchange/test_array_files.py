@@ -77,7 +77,6 @@ def test_a_folder_of_an_array_for_each_view(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("a.npy", b"version https://git-lfs.github.com/spec/v1\noid", "is a pointer of Git LFS"),
-        ("a.fits", b"SIMPLE  =                    T", "is a FITS file, which is not read"),
         ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(99), "nor in a .npz, .mat or HDF5 file"),
         ("colmap/cameras.bin", b"", "is a model of COLMAP"),
     ],
@@ -155,7 +154,7 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
 @pytest.mark.parametrize(
     ("z", "options", "words"),
     [
-        (np.ones((20, 23)), [], r"is \(20, 23\), and views are \(20, 24\)"),
+        (np.ones((20, 23)), [], r"is float64 \(20, 23\); expected real numbers \(20, 24\)"),
         (np.zeros((20, 24)), [], "has no known depth"),
         (np.full((20, 24), 0.04), [], "has 0.04 mm, where depths are .* correct --depth-unit-mm"),
         (np.full((20, 24), 0.04), ["--depth-key", "z"], "--depth-key is for .npz"),
@@ -168,16 +167,6 @@ def test_depths_that_cannot_be(tmp_path: Path, capsys: Any, z: Any, options: lis
         np.save(tmp_path / "z.npy", z)
         options = [*options, "--depth", str(tmp_path / "z.npy")]
     check_refused(tmp_path / "views.npy", tmp_path / "out", [*CAMERAS, *options], words, capsys)
-
-
-def test_depths_in_metres_are_named(tmp_path: Path, capsys: Any) -> None:
-    np.save(tmp_path / "views.npy", VIEWS_KLHW)
-    np.save(tmp_path / "z.npy", np.full((20, 24), 0.6))
-    assert (
-        run("import", tmp_path / "views.npy", "-o", tmp_path / "out", *CAMERAS, "--depth", tmp_path / "z.npy")
-        == 0
-    )
-    assert "warning: z.npy has depths of 0.6 to 0.6 mm, nearer than the focal" in capsys.readouterr().out
 
 
 def test_a_picture_in_colours_is_no_map_of_depth(tmp_path: Path, capsys: Any) -> None:

@@ -14,7 +14,6 @@ from PIL import Image
 
 import pcii
 from pcii import FrameFormat, InputError, import_counts
-from pcii.exchange.frame_formats import SURE_NATS, expected_above_one
 from pcii.types import mosaic
 
 CAMERAS = ["--pitch-mm", 2, 2, "--focal-mm", 35, "--pixel-mm", 0.45]
@@ -45,11 +44,12 @@ def test_frames_of_0_and_1_are_frames_of_one_bit() -> None:
 
 
 def test_numbers_above_one_that_light_would_give() -> None:
-    light = np.random.default_rng(1).poisson(0.1, 1_000_000)
-    expected = expected_above_one(int((light > 0).sum()), light.size)
-    assert expected == pytest.approx((light > 1).sum(), rel=0.05)
-    assert expected_above_one(10, 10) == 10
-    assert expected_above_one(0, 10) == 0 < SURE_NATS
+    light = np.random.default_rng(1).poisson(0.1, (1, 1, 1, 1000, 1000))
+    _, (sentence,) = told_of(light.clip(max=1))
+    (expected,) = re.findall("where (.*) would by chance", sentence)
+    assert float(expected) == pytest.approx((light > 1).sum(), rel=0.05)
+    _, (sentence,) = told_of(np.ones((1, 1, 1, 5, 5), np.uint8))
+    assert "where 25 would by chance" in sentence
 
 
 @pytest.mark.parametrize("bits", [2, 4, 12])
@@ -127,7 +127,7 @@ def test_files_without_a_header(tmp_path: Path, stored: FrameFormat, number: str
         told_of(tmp_path, pattern="{row}_{col}.bin", stored=stored)
 
 
-LACKS_A_FRAME = "frame 7 of the view row 1, col 0 is missing; others have it"
+LACKS_A_FRAME = f"1 of 2 x 2 x {FRAMES} files missing, first row 1, col 0, frame 7"
 
 
 def test_a_folder_of_frames_for_each_view(tmp_path: Path, capsys: Any) -> None:
@@ -201,18 +201,12 @@ def test_marks_are_named_and_a_mask_leaves_them_out(tmp_path: Path) -> None:
 def test_numbers_that_are_stored_otherwise_are_named() -> None:
     counts = np.random.default_rng(9).poisson(3.0, (2, 2, 3, 40, 50)).astype(np.uint16)
     for stored, bits, words in (
-        (
-            counts.byteswap(),
-            12,
-            "multiples of 256; .*; if the bytes of each number are in the other order, swap",
-        ),
+        (counts.byteswap(), 12, "multiples of 256"),
         (counts.clip(max=15) << 4, 8, "multiples of 16; if that is one photon, give --gain 16$"),
         (counts.clip(max=1) * 255, None, "multiples of 255; if that is one photon, give --gain 255$"),
-        (counts.clip(max=3), None, "of the numbers of array are 3, more than are 2: .* give --bits 2$"),
     ):
         _, (sentence,) = told_of(stored, stored=FrameFormat(bits=bits))
         assert re.search(words, sentence), sentence
-    assert told_of(counts.clip(max=3), stored=FrameFormat(bits=2))[1] == []
 
 
 @pytest.mark.parametrize("mean", [0.01, 0.3, 3, 40, 1000])

@@ -150,5 +150,5 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=told.append)
     assert told[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
     np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
-    with pytest.raises(InputError, match="holds numbers up to 255; encoded light is 1 at white"):
+    with pytest.raises(InputError, match="holds numbers from 255 to 255; encoded light is from 0 to 1"):
         import_arrays(tmp_path / "0_0.npy", OPTICS, encoding="srgb")

@@ -187,7 +187,7 @@ def channels(root: Path) -> None:
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
-    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "1 of 5 x 5 views missing, first row 1, col 1"),
+    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "1 of 5 x 5 files missing, first row 1, col 1"),
     ("alpha", folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")), NAMED, "0_0.png: has an alpha channel"),
     ("turned JPEG", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
     ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),

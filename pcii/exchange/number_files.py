@@ -1,21 +1,24 @@
-"""Picture files as arrays: PNG, JPEG, TIFF, OpenEXR and PFM, and the light that their numbers stand for.
+"""Numbers in files: pictures (PNG, JPEG, TIFF, OpenEXR, PFM) and arrays (NumPy, MATLAB, HDF5).
 
-Pillow, tifffile and OpenEXR read them, within their own limits of size.
+Pillow, tifffile and OpenEXR read pictures, within their own limits of size. A .npy file is mapped into
+memory, and read piece by piece; of other files an array is read whole, and a key names one of several.
 """
 
 import logging
 import warnings
+import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from pcii.base import InputError, srgb_to_linear, visible
+from pcii.base import InputError, times, visible
 
 LARGEST_BYTES = 1 << 33
-"""Most memory of all views together, and of all pages of a file: 8 GiB."""
+"""Most memory of all pages of a TIFF file, and of the array of an HDF5 file: 8 GiB."""
 STARTS = {
     b"\x89PNG\r\n\x1a\n": "PNG",
     b"\xff\xd8\xff": "JPEG",
@@ -26,28 +29,28 @@ STARTS = {
     b"\x76\x2f\x31\x01": "EXR",
     b"Pf": "PFM",
 }
-OTHER_FILES = {
-    b"version https://git-lfs": "is a pointer of Git LFS and not the file itself; run git lfs pull",
-    b"SIMPLE  =": "is a FITS file, which is not read; save its array as .npy, TIFF or HDF5",
-}
-"""Starts of files that people give for pictures or arrays, and what is said of them."""
+GIT_LFS_START = b"version https://git-lfs"
+VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
+"""Kinds of pictures of views."""
+EXACT = ("PNG", "TIFF", "EXR")
+"""Kinds of pictures that keep photon counts."""
 PILLOW_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I;16", "F")
 TIFF_KINDS = ("MINISBLACK", "RGB", "CFA", "YCBCR")
-LIGHT_TYPES = ("uint8", "uint16", "float16", "float32", "float64")
-TIFF_TYPES = (*LIGHT_TYPES, "bool", "uint32", "int16", "int32")
+TIFF_TYPES = ("bool", "uint8", "uint16", "uint32", "int16", "int32", "float16", "float32", "float64")
 SRGB_GAMMA = 0.45455
 """What a PNG file of sRGB may state as its gamma."""
 SRGB_PRIMARIES = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
-"""Chromaticities (x, y) of red, green, blue and white, as an EXR file may state them."""
-PNG_PRIMARIES = (*SRGB_PRIMARIES[6:], *SRGB_PRIMARIES[:6])
-"""The same of a PNG file, where white comes first."""
-LARGEST_ENCODED = 2.0
-"""Largest encoded float that is taken: white is 1, and sharpened pictures exceed it a little. Numbers of 8
-bits or more, which are refused, reach far more: any limit from 1.5 to 100 decides alike."""
+"""Chromaticities (x, y) of red, green, blue and white, as files may state them. White is first in PNG."""
 UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
-Encoding = Literal["srgb", "linear"] | float
-"""How numbers stand for light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
+HDF5_START = b"\x89HDF\r\n\x1a\n"
+MATLAB_HEAD_BYTES = 512
+"""What MATLAB writes before the HDF5 content of a .mat file of version 7.3."""
+LEAST_AXES = 3
+"""Views have at least as many axes: the only such array of a file is read without a key."""
+MOST_NAMED = 6
+"""Largest number of arrays that a sentence names."""
+FORMATS_EXTRA = 'pip install "photon-integral-imaging[formats]"'
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,19 +100,20 @@ class Picture:
 
 def kind_of(path: Path) -> str | None:
     """PNG, JPEG, TIFF, EXR or PFM, by the first bytes of a file; None for any other."""
-    with path.open("rb") as file:
-        head = file.read(max(map(len, STARTS)))
+    head = _head_of(path)
     return next((kind for start, kind in STARTS.items() if head.startswith(start)), None)
 
 
-def name_other_file(path: Path) -> None:
-    """Raise `InputError` for a file whose start says that it is of a kind that is not read."""
-    if path.is_file():
+def _head_of(path: Path) -> bytes:
+    """The first bytes of a file; `InputError` if it cannot be read, and for a pointer of Git LFS."""
+    try:
         with path.open("rb") as file:
-            head = file.read(max(map(len, OTHER_FILES)))
-        for start, sentence in OTHER_FILES.items():
-            if head.startswith(start):
-                raise InputError(f"{path}: {sentence}")
+            head = file.read(MATLAB_HEAD_BYTES + len(HDF5_START))
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror})") from None
+    if head.startswith(GIT_LFS_START):
+        raise InputError(f"{path}: is a pointer of Git LFS and not the file itself; run git lfs pull")
+    return head
 
 
 def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
@@ -117,95 +121,37 @@ def picture_of(path: Path, kinds: Sequence[str]) -> Picture:
 
     Pictures have one or three channels beside alpha.
     """
-    readers = {"TIFF": _read_tiff, "EXR": _read_exr}
-    name_other_file(path)
+    kind = kind_of(path)
+    if kind is None or kind not in kinds:
+        names = " or ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
+        raise InputError(f"{path}: not a{'n' * names.startswith('E')} {names} picture")
     try:
-        kind = kind_of(path)
-        if kind is None or kind not in kinds:
-            names = " or ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
-            raise InputError(f"not a{'n' * names.startswith('E')} {names} picture")
-        picture = readers.get(kind, _read_pillow)(path)
-        if picture.shape[2] not in (1, 3):
-            raise InputError(f"has {picture.shape[2]} channels; expected 1 or 3")
+        picture = {"TIFF": _read_tiff, "EXR": _read_exr}.get(kind, _read_pillow)(path)
     except InputError as fault:
         raise InputError(f"{path}: {visible(str(fault))}") from None
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
     except MemoryError:
         raise
     except Exception as fault:  # decoders raise various exceptions for damaged content
         raise InputError(f"{path}: damaged or cut off, it cannot be read ({visible(str(fault))})") from None
+    if picture.shape[2] not in (1, 3):
+        raise InputError(f"{path}: has {picture.shape[2]} channels; expected 1 or 3")
     return picture
 
 
-def decode(picture: Picture) -> Iterator[np.ndarray]:
-    """Pixels (H, W, C) of each page of a picture, without alpha.
+def decode(picture: Picture) -> np.ndarray:
+    """Pixels (pages, H, W, C) of a picture, without alpha.
 
     Raises `InputError`, naming the file, for pixels that are not opaque, or have to be turned.
     """
-    pixels = picture.pixels
-    if picture.alpha:
-        if not (pixels[..., -1] == picture.most).all():
-            raise InputError(
-                f"{picture.path}: has an alpha channel that is not opaque everywhere; save it without"
-            )
-        pixels = pixels[..., :-1]
+    if picture.alpha and not (picture.pixels[..., -1] == picture.most).all():
+        raise InputError(
+            f"{picture.path}: has an alpha channel that is not opaque everywhere; save it without"
+        )
     if picture.orientation != UPRIGHT:
         raise InputError(
             f"{picture.path}: has to be turned (EXIF orientation {picture.orientation}); save it upright"
         )
-    yield from pixels
-
-
-def radiance_of(picture: Picture, pixels: np.ndarray, encoding: Encoding | None) -> np.ndarray:
-    """Linear radiance (H, W, C), float32, of a picture's pixels."""
-    if picture.dtype.name not in LIGHT_TYPES:
-        raise InputError(f"{picture.path}: {picture.dtype} is no type of light; photon counts need --counts")
-    try:
-        return to_radiance(pixels, encoding, picture.most)
-    except InputError as fault:
-        raise InputError(f"{picture.path}: {fault}") from None
-
-
-def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None = None) -> np.ndarray:
-    """Linear radiance, float32, of whole numbers (of 1 at `most`) or of floats.
-
-    `most` is by default the largest number of the type. Without an encoding whole numbers are sRGB, as in
-    nearly all picture files, and floats are linear. Raises `InputError` for an encoding that is none, for
-    numbers that are NaN or infinite, for encoded ones below 0, and for light that is too bright for float32.
-
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
-    [0.0, 0.216, 1.0]
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
-    [0.0, 0.502, 1.0]
-    """
-    is_number = isinstance(encoding, int | float) and 0.1 <= encoding <= 10
-    if encoding not in (None, "srgb", "linear") and not is_number:
-        raise InputError(f"encoding: expected srgb, linear, or a gamma from 0.1 to 10, got {encoding!r}")
-    is_whole = numbers.dtype.kind == "u"
-    if not is_whole and not np.isfinite(numbers).all():
-        raise InputError("holds NaN or infinity; radiance is finite")
-    if encoding is None:
-        encoding = "srgb" if is_whole else "linear"
-    full = most or (np.iinfo(numbers.dtype).max if is_whole else 1)
-    if encoding == "srgb" and is_whole:  # few values are many pixels
-        return srgb_to_linear(np.arange(full + 1) / full).astype(np.float32)[numbers]
-    share = numbers / np.float32(full) if is_whole else numbers
-    if encoding != "linear" and not is_whole and share.size and share.min() < 0:
-        raise InputError("holds numbers below 0, which no encoded light has")
-    if encoding != "linear" and not is_whole and share.size and share.max() > LARGEST_ENCODED:
-        raise InputError(
-            f"holds numbers up to {share.max():g}; encoded light is 1 at white: divide by its number"
-        )
-    with np.errstate(over="ignore"):
-        if encoding == "srgb":
-            share = srgb_to_linear(share)
-        elif encoding != "linear":
-            share = (share if is_whole else share.astype(np.float64)) ** encoding
-        linear = share.astype(np.float32)
-    if not np.isfinite(linear).all():
-        raise InputError("holds light that is too bright for float32")
-    return linear
+    return picture.pixels[..., : picture.shape[2]]
 
 
 def _read_pillow(path: Path) -> Picture:
@@ -220,13 +166,12 @@ def _read_pillow(path: Path) -> Picture:
         if count != 1 and image.format != "MPO":  # a telephone's JPEG may have a preview
             raise InputError(f"holds {count} pictures; give a file with one")
         unused = f"{count - 1} more pictures" if count != 1 else _profile(image.info.get("icc_profile"))
-        gamma = image.info.get("gamma", SRGB_GAMMA)
-        primaries = image.info.get("chromaticity", PNG_PRIMARIES)
         if "srgb" not in image.info and not unused:
+            gamma, primaries = image.info.get("gamma", SRGB_GAMMA), image.info.get("chromaticity")
             if abs(gamma - SRGB_GAMMA) > 0.01:
                 unused = f"the gamma of {gamma:g}"
-            elif not np.allclose(primaries, PNG_PRIMARIES, atol=1e-3):
-                unused = "the chromaticities"
+            elif primaries is not None:
+                unused = _primaries(np.roll(primaries, -2))
         image.load()  # a PNG may have its orientation after its pixels
         orientation = image.getexif().get(0x0112, UPRIGHT)
         if stored.endswith("16B"):  # of which Pillow keeps 8 bits
@@ -264,7 +209,7 @@ def _read_tiff(path: Path) -> Picture:
         if sum(one.nbytes for one in series) > LARGEST_BYTES:
             raise InputError(f"its pages are more than {LARGEST_BYTES >> 30} GiB")
         if len({(one.keyframe.shape, one.dtype) for one in series}) != 1:
-            sizes = " and ".join(sorted({" x ".join(map(str, one.shape)) for one in series})[:3])
+            sizes = " and ".join(sorted({times(one.shape) for one in series})[:3])
             raise InputError(f"holds pictures of different sizes or types ({sizes}); save those of one kind")
         parts = []
         for one in series:
@@ -290,6 +235,11 @@ def _profile(content: bytes | None) -> str:
     return "" if not text or (b"sRGB" in text and b"inear" not in text) else "the colour profile"
 
 
+def _primaries(stated: Any) -> str:
+    """What is said of chromaticities: nothing of those of sRGB."""
+    return "" if np.allclose(stated, SRGB_PRIMARIES, atol=1e-3) else "the chromaticities"
+
+
 def _raw_tags(tags: Any) -> Iterator[str]:
     """What is said of the tags of raw pictures (TIFF/EP, DNG) in a TIFF file."""
     if 33422 in tags:
@@ -302,26 +252,108 @@ def _raw_tags(tags: Any) -> Iterator[str]:
 def _read_exr(path: Path) -> Picture:
     import OpenEXR
 
-    with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True, header_only=True) as file:
+    with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
         if len(file.parts) != 1:
             raise InputError(f"has {len(file.parts)} parts; save each as a picture of its own")
-        header = file.parts[0].header
-        window, display = (np.ravel(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
-        primaries = header.get("chromaticities", SRGB_PRIMARIES)
-        aspect = header.get("pixelAspectRatio", 1.0)
-    if window != display:
-        raise InputError("its data window is not its display window; save the whole picture")
-    with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
-        channels = file.parts[0].channels
+        header, channels = file.parts[0].header, file.parts[0].channels
+        if not np.array_equal(header["dataWindow"], header["displayWindow"]):
+            raise InputError("its data window is not its display window; save the whole picture")
         colours = "RGB" if {*"RGB"} <= {*channels} else "Y"
         if not {*colours} <= {*channels}:
             names = ", ".join(sorted(channels))[:60]
             raise InputError(f"has the channels {names}; expected R, G and B, or Y")
         alpha, others = "A" in channels, sorted({*channels} - {*colours, "A"})
         planes = [np.float32(channels[name].pixels) for name in colours + "A" * alpha]
-    unused = f"the channels {', '.join(others)}"[:80] if others else ""
-    unused_parts = [unused, "" if np.allclose(primaries, SRGB_PRIMARIES, atol=1e-3) else "the chromaticities"]
-    unused_parts.append("" if aspect == 1 else f"the pixel aspect ratio of {aspect:g}")
-    return Picture(
-        path, np.stack(planes, axis=-1)[None], alpha, unused=" and ".join(filter(None, unused_parts))
-    )
+        aspect = header.get("pixelAspectRatio", 1.0)
+        unused = [
+            f"the channels {', '.join(others)}"[:80] if others else "",
+            _primaries(header.get("chromaticities", SRGB_PRIMARIES)),
+            "" if aspect == 1 else f"the pixel aspect ratio of {aspect:g}",
+        ]
+    pixels = np.stack(planes, axis=-1)[None]
+    return Picture(path, pixels, alpha, unused=" and ".join(filter(None, unused)))
+
+
+def open_array(path: Path, key: str | None = None) -> np.ndarray:
+    """The array of a .npy file, mapped into memory, or in memory that of a .npz, .mat or HDF5 file.
+
+    `key` names one of several; it is not needed if one alone has at least three axes. Axes are in the order
+    that the writing program shows: of .mat files that of MATLAB. Raises `InputError`, naming the file, for
+    what is no array, for a key that it lacks, and for one that memory does not hold.
+    """
+    head = _head_of(path)
+    try:
+        if HDF5_START in (head[: len(HDF5_START)], head[MATLAB_HEAD_BYTES:]):
+            numbers = _read_hdf5(path, key, is_turned=head.startswith(b"MATLAB"))
+        elif head.startswith(b"MATLAB 5.0") or path.suffix.lower() == ".mat":
+            numbers = _read_matlab(path, key)
+        elif zipfile.is_zipfile(path):
+            numbers = _read_archive(path, key)
+        elif key is not None:
+            raise InputError(f"{path}: --key is for .npz, .mat and HDF5 files, and this has one array")
+        else:
+            numbers = np.load(path, mmap_mode="r", allow_pickle=False)
+    except InputError:
+        raise
+    except MemoryError:
+        raise InputError(f"{path}: its array is larger than the memory; save it as .npy") from None
+    except Exception:  # damaged content raises various exceptions
+        raise InputError(
+            f"{path}: not an array of numbers in a .npy file, as numpy.save writes it, nor in a .npz, .mat "
+            "or HDF5 file"
+        ) from None
+    return numbers
+
+
+def _read_archive(path: Path, key: str | None) -> np.ndarray:
+    """An array of a .npz file, in which objects may be beside it."""
+    arrays: dict[str, np.ndarray] = {}
+    with np.load(path, allow_pickle=False) as archive:
+        for name in archive.files:
+            with suppress(ValueError):  # of objects, which are not read
+                arrays[name] = archive[name]
+    return arrays[_chosen(path, key, {name: array.shape for name, array in arrays.items()})]
+
+
+def _read_matlab(path: Path, key: str | None) -> np.ndarray:
+    """An array of a .mat file of version 4 to 7.2, with its axes as MATLAB shows them."""
+    from scipy.io import loadmat, whosmat
+
+    shapes = {name: shape for name, shape, kind in whosmat(path) if kind not in ("char", "cell", "struct")}
+    name = _chosen(path, key, shapes)
+    return np.asarray(loadmat(path, variable_names=[name])[name])
+
+
+def _read_hdf5(path: Path, key: str | None, is_turned: bool) -> np.ndarray:
+    """An array of an HDF5 file; MATLAB stores axes from the last to the first, and these are turned back."""
+    try:
+        import h5py
+    except ModuleNotFoundError:
+        raise InputError(f"{path}: is an HDF5 file, which h5py reads; install it: {FORMATS_EXTRA}") from None
+    shapes: dict[str, tuple[int, ...]] = {}
+    with h5py.File(path, "r") as file:
+
+        def note(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "biufc" and not name.startswith("#"):
+                shapes[name] = item.shape[::-1] if is_turned else item.shape
+
+        file.visititems(note)
+        stored: Any = file[_chosen(path, key, shapes)]
+        if stored.nbytes > LARGEST_BYTES:
+            raise InputError(f"{path}: its array is more than {LARGEST_BYTES >> 30} GiB; save it as .npy")
+        numbers = stored[()]
+    return numbers.T if is_turned else numbers
+
+
+def _chosen(path: Path, key: str | None, shapes: dict[str, tuple[int, ...]]) -> str:
+    """The key of the array to read; `InputError`, naming those that there are, if it is not clear which."""
+    large = [name for name, shape in shapes.items() if len(shape) >= LEAST_AXES]
+    wanted = key.strip("/") if key is not None else large[0] if len(large) == 1 else ""
+    if wanted in shapes:
+        return wanted
+    if not shapes:
+        raise InputError(f"{path}: holds no array of numbers")
+    names = [f"{name} {times(shape)}" for name, shape in shapes.items()]
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    which = "say which with --key" if key is None else f"and no {visible(key)}; correct --key"
+    raise InputError(f"{path}: holds {visible(', '.join(names[:MOST_NAMED]))}{more}; {which}")
