@@ -1,57 +1,45 @@
-"""The page of an evaluation: charts and tables of means, how to read them, and what made them.
+"""The page of an evaluation: charts and tables of means and ranks, and what made them.
 
-Charts are of a measure against photons and time, and of how far confidence is right.
+Charts are of a measure against photons and time, and of how far confidence is right. Tables are of texts, for
+terminals too.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pcii.base import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.summary import means, over_scenes, with_yardsticks
-from pcii.evaluation.tables import NOT_BETTER, TITLES, light_name, tables_of
-from pcii.figures import PLACES, accuracy_chart, calibration_chart, figure_uri, render_page, text_table
+from pcii.evaluation.measures import (
+    AXES,
+    DECISIVE,
+    MEASURES,
+    MORE_IS_BETTER,
+    SIMPLE,
+    kind_of,
+    with_yardsticks,
+)
+from pcii.evaluation.summary import Over, lines_of, means, over_scenes, ranked_over, ranks
+from pcii.figures import (
+    NOT_KNOWN,
+    PLACES,
+    accuracy_chart,
+    calibration_chart,
+    emphasised,
+    figure_uri,
+    render_page,
+    text_table,
+)
 from pcii.store import EVALUATION_FOLDER, ROWS, hash_file, list_files
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame, Series
 
-AXES = {
-    "iou": "IoU, mean over planes with objects",
-    "pixel_iou": "IoU with the points in focus, mean over planes",
-    "false_share": "share of the film claimed falsely",
-    "within_1px": "share of depths within 1 px",
-    "within_3px": "share of depths within 3 px",
-    "quadratic_score": "quadratic score of confidence",
-    "median_px": "median error of depth, px of total disparity",
-}
-"""Measures of accuracy that are drawn, with the labels of their axes."""
-ERRORS = ("median_px",)
-"""Of these, what is no share."""
-ABOUT_YARDSTICKS = (
-    "Three look at no photon: (nothing) claims nothing and answers nowhere, (everything) claims the whole "
-    "film at every plane, and (one depth) answers the depth that is right for most pixels, which only the "
-    "truth tells. Sweeps are the simplest methods of depth. "
-    f"{NOT_BETTER}: no better than the best of all these for the same scene and light."
-)
-NOTES = (
-    "IoU compares masks with the objects that belong to each plane, and is a mean over planes that hold any. "
-    "What leans through the depths belongs to no plane: it counts in the IoU of pixels, and in depth. In "
-    "brackets: 95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the "
-    "logarithm of the mean for seconds and other values that are never negative.",
-    "In bold: the best mean of the same scene and photons. Others may be as good: see the interval of the "
-    "difference.",
-    "p: two-sided sign-flip permutation test on the same datasets, without correction for multiple "
-    "comparisons. Of n pairs it cannot be less than 2 / 2^n, so fewer than six never give 0.05.",
-    "Over several scenes every scene counts once, as the mean over its seeds. Ranks are of the scenes and "
-    "seeds that all methods have; their intervals and p are of the spread between scenes.",
-    ABOUT_YARDSTICKS,
-    "Depth: shares are of the objects' pixels, within 1 or 3 px of total disparity, and a missing answer is "
-    "a wrong one, in the median too. Quadratic score: share within 1 px minus the Brier score of confidence; "
-    "0 is who never answers, 1 who is always right and sure. Bound: the least standard deviation of the "
-    "depth of an object as a whole (Cramér-Rao), median of the objects. ECE: how far confidence and the "
-    "share of depths within 1 px are apart on average, over all answered pixels.",
-)
+NOT_BETTER = "†"
+"""Mark of a mean that is no better than the best of `SIMPLE` for the same scene and light."""
+MAX_DETAILED_SCENES = 12
+"""Largest number of scenes with tables of all measures: a page with those of more is too large to load."""
 
 
 def write_evaluation(
@@ -68,9 +56,8 @@ def write_evaluation(
     warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
     content = {
         "warnings": [warning] if differing else [],
-        "notes": NOTES,
         "charts": {words: chart for words, chart in _charts(over_scenes(cell_means)) if chart},
-        "tables": dict(tables_of(frame, cell_means)),
+        "tables": dict(_tables_of(frame, cell_means)),
         "origin": _origin_table(origin, hash_file(out / ROWS)),
     }
     files = {
@@ -85,7 +72,7 @@ def write_evaluation(
 def _charts(table: "DataFrame") -> Iterator[tuple[str, str]]:
     """What a chart of means by method and light shows, and the chart; empty if nothing is known of it."""
     methods: list[str] = []
-    for measure in TITLES:
+    for measure in DECISIVE:
         methods = sorted(table["method"][table["measure"] == measure].unique())
         yield f"{AXES[measure]} against photons and time", accuracy_plot(table, methods, measure)
     yield "share of correct depths against confidence, by light", _calibration_plot(table, methods)
@@ -110,12 +97,12 @@ def _with_row_counts(rows_by_text: Mapping[str, int]) -> str:
 
 
 def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> str:
-    """One of `AXES` against photons per view, and against seconds, as a PNG in a data URI.
+    """A measure against photons per view, and against seconds, as a PNG in a data URI.
 
     `table` has means by method, light and measure. Empty if no method has the measure.
     """
     cells = accuracies(table, measure)
-    figure = accuracy_chart(cells, methods, AXES[measure], is_share=measure not in ERRORS)
+    figure = accuracy_chart(cells, methods, AXES[measure], is_share=kind_of(measure) != "positive")
     return "" if figure is None else figure_uri(figure)
 
 
@@ -138,3 +125,125 @@ def _calibration_plot(table: "DataFrame", methods: Sequence[str]) -> str:
     bins = bins.pivot(index=["method", "light", "bin"], columns="part", values="mean").reset_index()
     bins = bins.dropna(subset="confidence").sort_values(["light", "method"], kind="stable")
     return figure_uri(calibration_chart(bins.assign(light=bins["light"].map(light_name)), methods))
+
+
+def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
+    """A mean with its interval as text, a dash for NaN.
+
+    >>> with_interval(0.912, 0.905, 0.919), with_interval(0.912, float("nan"), float("nan"))
+    ('0.912 (0.905 to 0.919)', '0.912')
+    """
+    if np.isnan(mean):
+        return NOT_KNOWN
+    text = f"{mean:.{digits}f}"
+    return text if np.isnan(low) else f"{text} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def light_name(light: float | str) -> str:
+    """A light of the frame as the name of a column or plot.
+
+    >>> light_name(300.0), light_name("full-light"), light_name("by exposure")
+    ('300', 'full light', 'by exposure')
+    """
+    return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
+
+
+def _tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
+    """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
+
+    Each has its title. `frame` is of `summary.with_yardsticks`, `cell_means` its means by scene, light and
+    method.
+    """
+    for (decisive, title), task in zip(DECISIVE.items(), ("removal", "depth"), strict=True):
+        means = cell_means[cell_means["measure"] == decisive]
+        if not len(means):
+            continue
+        ranked = ranks(frame, decisive)
+        if len(ranked):
+            unit = ranked_over(frame, decisive)
+            yield f"{title}, methods compared on the same {unit}", rank_table(ranked, unit)
+        yield f"{title} by photons per view", mean_table(means, ["scene", "method"], "light", light_name)
+        if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
+            yield f"{title} beside other measures", _measure_table(cell_means, means, task)
+
+
+def decisive_means(cell_means: "DataFrame") -> Iterator[tuple[str, str]]:
+    """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
+    means = over_scenes(cell_means)
+    for measure, title in DECISIVE.items():
+        of_measure = means[means["measure"] == measure]
+        if len(of_measure):
+            table = of_measure.pivot(index="method", columns="light", values="mean").sort_index(
+                axis="columns"
+            )
+            table = table.rename(columns={light: light_name(light) for light in table.columns})
+            table.index.name = table.columns.name = None
+            yield title, table.to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
+
+
+def _measure_table(cell_means: "DataFrame", means: "DataFrame", task: str) -> "DataFrame":
+    """All measures of removal or of depth of the methods in `means`, by scene, light and method."""
+    import pandas as pd
+
+    names = {measure.name: measure.column for measure in MEASURES if measure.of in (task, "both")}
+    is_shown = cell_means["measure"].isin(list(names)) & cell_means["method"].isin(means["method"].unique())
+    shown = cell_means[is_shown]
+    shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
+    return mean_table(shown, ["scene", "light", "method"], "measure", lambda name: names[name])
+
+
+def mean_table(
+    means: "DataFrame",
+    rows: Sequence[str],
+    column: str,
+    name: Callable[[Any], str] = str,
+    full_n: int = 0,
+    bound: str = "",
+) -> "DataFrame":
+    """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
+
+    Of `MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where another
+    is worse, and `NOT_BETTER` marks methods that are no better than the best of `SIMPLE`; `bound`
+    names what is no method. Means of fewer than `full_n` values have their number.
+    """
+    import pandas as pd
+
+    contest = [key for key in ("scene", "light", "measure") if key in means]
+    methods = means["method"].astype(object)
+    is_simple = methods.isin(SIMPLE)
+    values = means["mean"].where(means["measure"].isin(MORE_IS_BETTER) & (methods != bound))
+
+    def best_of(some: "Series") -> "Series":
+        return some.groupby([means[key] for key in contest], observed=True).transform("max")
+
+    is_best = (values == best_of(values)) & (values > -best_of(-values))
+    is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
+    texts: list[str] = []
+    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
+        number = f" of {row.n}" if row.n < full_n else ""
+        text = with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
+        texts.append(emphasised(text) if row.is_best else text)
+    cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
+    table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
+    table = table.fillna(NOT_KNOWN).set_axis([*map(name, table.columns)], axis="columns").reset_index()
+    if "light" in table:
+        table["light"] = [*map(light_name, table["light"])]
+    return table.set_index([*rows])
+
+
+def rank_table(table: "DataFrame", unit: Over) -> "DataFrame":
+    """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
+    rows = [
+        (
+            row.method,
+            light_name(row.light),
+            str(row.rank),
+            with_interval(row.mean, row.low, row.high),
+            with_interval(row.difference, row.difference_low, row.difference_high),
+            *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
+            str(row.n),
+        )
+        for row in lines_of(table)
+    ]
+    header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible", unit)
+    return text_table(rows, header)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from pcii.base import InputError
+from pcii.evaluation.measures import MORE_IS_BETTER, Kind, kind_of
 from pcii.evaluation.rows import HEAD
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
 
-Kind = Literal["signed", "share", "positive", "geometric"]
 Over = Literal["scenes", "datasets"]
 CONFIDENCE = 0.95
 MAX_EXACT_PAIRS = 14
@@ -25,22 +25,6 @@ RANDOM_FLIPS = 10_000
 MIN_SCENES = 2
 """One scene has no spread over scenes."""
 CELL = ("scene", "light", "method")
-SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
-SHARES |= {"claimed_share", "false_share", "within_1px", "within_3px", "bad_1px", "bad_3px", "coverage"}
-SHARES |= {"badpix_007", "brier", "ece", "share", "confidence", "correct"}
-MORE_IS_BETTER = ("iou", "pixel_iou", "within_1px", "within_3px", "quadratic_score")
-"""What methods are compared by."""
-SIGNED = {"bias_mm", "bias_px", "quadratic_score"}
-
-
-NOTHING = "(nothing)"
-YARDSTICKS = {"everything": "(everything)", "one_depth": "(one depth)"}
-"""Prefixes of columns with the scores of a yardstick, which looks at no photon, and its name among methods.
-
-One claims everything at every plane, the other answers the one depth that is right for most pixels; `NOTHING`
-claims nothing and answers nowhere."""
-LOOK_AT_NO_PHOTON = (NOTHING, *YARDSTICKS.values())
-"""Names in parentheses, which no method has: see `method_names.check_name`."""
 
 
 class Mean(NamedTuple):
@@ -120,35 +104,9 @@ def sign_flip_p(differences: np.ndarray) -> tuple[np.ndarray, float]:
     return np.asarray(test.pvalue), 2 / 2**n if is_exact else 2 / (1 + RANDOM_FLIPS)
 
 
-def kind_of(measure: str) -> Kind:
-    """What interval the mean of a measure has."""
-    name = measure.removeprefix("pixel_").rpartition(".")[2]
-    return "share" if name in SHARES else "signed" if name in SIGNED else "positive"
-
-
 def lines_of(table: "DataFrame") -> list[Any]:
     """The rows of a table, each with its columns as attributes."""
     return list(table.itertuples())
-
-
-def with_yardsticks(frame: "DataFrame") -> "DataFrame":
-    """The frame with rows of `YARDSTICKS` and `NOTHING`, in place of the columns with their scores."""
-    import pandas as pd
-
-    keys = [name for name in HEAD if name != "method"] + ["photons_per_view"]
-    columns = [str(column) for column in frame.columns]
-    names = {
-        prefix: {name: name.replace(f"{prefix}.", "") for name in columns if f"{prefix}." in name}
-        for prefix in YARDSTICKS
-    }
-    parts = [frame.drop(columns=[name for measures in names.values() for name in measures])]
-    for prefix, measures in names.items():
-        scores = frame[[*keys, *measures]].dropna(how="all", subset=[*measures])
-        scores = scores.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=measures)
-        nothing = scores.assign(method=NOTHING)
-        nothing[[*measures.values()]] *= 0.0
-        parts += [scores.assign(method=YARDSTICKS[prefix]), nothing]
-    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
 
 
 def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
