@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels, slider_panels
+from pcii.app.report_pictures import report_panels
 from pcii.base import write_bytes_safely
 from pcii.evaluation import NamedMethod, depth_name, mean_interval, software_of
 from pcii.figures import NOT_KNOWN, emphasised, render_page, text_table
@@ -26,23 +26,21 @@ from pcii.types import PhotonCounts, Sections, Truth
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-COARSE_PX = 320
-"""Smaller pictures are enlarged with sharp pixels."""
-NUMBERS = {
-    "iou": "IoU",
-    "everything": "IoU of all claimed",
-    "precision": "precision",
-    "recall": "recall",
-    "f1": "F1",
-    "boundary_f": "boundary F",
-    "photon_precision": "photon precision",
-    "photon_recall": "photon recall",
-    "entropy_before": "entropy before",
-    "entropy_after": "entropy after",
-    "claimed_share": "claimed share",
-    "false_share": "claimed falsely",
-}
+NUMBERS = (
+    "iou",
+    "everything",
+    "precision",
+    "recall",
+    "f1",
+    "boundary_f",
+    "photon_precision",
+    "photon_recall",
+)
+NUMBERS += ("entropy_before", "entropy_after", "claimed_share", "false_share")
 """Columns of the scores after those that say what is scored."""
+NAMES = {"iou": "IoU", "everything": "IoU of all claimed", "f1": "F1", "boundary_f": "boundary F"}
+NAMES |= {"false_share": "claimed falsely"}
+"""Names of columns, where they are not those of the scores."""
 JACKKNIFE_GROUPS = 10
 """Intervals of so few pseudo-values are 15 % longer than those of many, and take a fraction of the time."""
 MAX_JACKKNIFE_EVENTS = 5_000_000
@@ -51,28 +49,17 @@ MAX_JACKKNIFE_EVENTS = 5_000_000
 
 def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
-    dataset, pictures = outcome.dataset, Pictures.of(outcome)
-    grid, (rows, cols) = dataset.grid, pictures.box
-    slider, first = slider_panels(pictures)
+    dataset = outcome.dataset
     content = {
         "title": dataset.manifest.get("title") or dataset.name,
-        "grid": grid,
+        "grid": dataset.grid,
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
         "has_truth": dataset.truth is not None,
-        "rows": rows,
-        "cols": cols,
-        "is_coarse": max(rows.stop - rows.start, cols.stop - cols.start) < COARSE_PX,
-        "smoothing_px": pictures.smoothing_px,
-        "light": pictures.light,
-        "slider": slider,
-        "first": first,
-        "input": input_panels(pictures),
-        "planes": plane_panels(pictures),
-        "depth": depth_panels(pictures),
-        "depth_table": depth_table(outcome),
-        "entropies": entropy_table(outcome),
-        "scores": score_table(outcome),
+        **report_panels(outcome),
+        "depth_table": _depth_table(outcome),
+        "entropies": _entropy_table(outcome),
+        "scores": _score_table(outcome),
         "origin": text_table(_origin(outcome), ("what", "value"), words=2),
         "recipe": json.dumps(dataset.manifest.get("recipe"), indent=1, ensure_ascii=False).splitlines(),
     }
@@ -109,7 +96,7 @@ def _versions(versions: dict[str, str]) -> str:
     return ", ".join(f"{name} {number}" for name, number in versions.items())
 
 
-def entropy_table(outcome: Outcome) -> "DataFrame":
+def _entropy_table(outcome: Outcome) -> "DataFrame":
     """Entropies of the objects at each plane with their intervals (the paper's Table 1).
 
     The lowest of a row stands out. There are no intervals of too few photons, nor of radiance.
@@ -186,7 +173,7 @@ def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:
         yield PhotonCounts.from_events(*places, grid=counts.grid, cfa=counts.cfa)
 
 
-def score_table(outcome: Outcome) -> "DataFrame":
+def _score_table(outcome: Outcome) -> "DataFrame":
     """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
     rows = [{**row, "everything": row["everything"]["iou"]} for row in outcome.score.planes]
     words = ["plane", "method", "truth", "objects"]
@@ -201,7 +188,7 @@ def score_table(outcome: Outcome) -> "DataFrame":
         objects = "all in focus" if row["truth"] == "pixel" else row["object"] or "none at this plane"
         texts = [f"{row['z_mm']:g} mm", row["method"], row["truth"], objects][: len(words)]
         cells.append((*texts, *(NOT_KNOWN if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
-    header = (*words, *(NUMBERS[key] for key in numbers))
+    header = (*words, *(NAMES.get(key, key.replace("_", " ")) for key in numbers))
     return text_table(cells, header, words=len(words))
 
 
@@ -232,7 +219,7 @@ def _pixels_of_depth(truth: Truth | None) -> str:
     return "the objects' pixels" if has_objects else "all pixels with a true depth"
 
 
-def depth_table(outcome: Outcome) -> "DataFrame":
+def _depth_table(outcome: Outcome) -> "DataFrame":
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
     rows: list[tuple[str, str]] = []

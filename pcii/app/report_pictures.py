@@ -6,6 +6,7 @@ objects or, without any, around what the methods claim.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from pcii.metrics import TrueFocus
 from pcii.sections import reconstruct
 from pcii.types import FocalPlanes, Sections, colours_and_samples, total_disparity_px
 
+COARSE_PX = 320
+"""Smaller pictures are enlarged with sharp pixels."""
 LONGEST_PX = 640
 """Longer sides of pictures are shown in blocks of 2 x 2 pixels, or of more."""
 MAX_SLIDER_PLANES = 20
@@ -102,7 +105,26 @@ class Pictures:
         return exposed(images, self.step_px, smoothing_px)
 
 
-def slider_planes(outcome: Outcome) -> FocalPlanes:
+def report_panels(outcome: Outcome) -> dict[str, Any]:
+    """What the page has of pictures: panels, rows and columns of the frame, light and smoothing."""
+    pictures = Pictures.of(outcome)
+    rows, cols = pictures.box
+    slider, first = _slider_panels(pictures)
+    return {
+        "rows": rows,
+        "cols": cols,
+        "is_coarse": max(rows.stop - rows.start, cols.stop - cols.start) < COARSE_PX,
+        "smoothing_px": pictures.smoothing_px,
+        "light": pictures.light,
+        "slider": slider,
+        "first": first,
+        "input": _input_panels(pictures),
+        "planes": _plane_panels(pictures),
+        "depth": _depth_panels(pictures),
+    }
+
+
+def _slider_planes(outcome: Outcome) -> FocalPlanes:
     """Planes through the depth range and those of the analysis, evenly spaced in total disparity."""
     grid, z_mm = outcome.dataset.grid, outcome.sections.z_mm
     near, far = min(outcome.z_range_mm[0], z_mm.min()), max(outcome.z_range_mm[1], z_mm.max())
@@ -114,24 +136,24 @@ def slider_planes(outcome: Outcome) -> FocalPlanes:
     return planes.take(slice(None, None, -1))  # from near to far
 
 
-def slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
+def _slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
     """Sections through the depth range, all at one exposure, and which is at the first plane of the analysis.
 
     Captions are depths.
     """
-    outcome, planes = pictures.outcome, slider_planes(pictures.outcome)
+    outcome, planes = pictures.outcome, _slider_planes(pictures.outcome)
     stacks = (
         reconstruct(outcome.dataset.counts_or_views, planes.take(slice(first, first + SECTIONS_AT_ONCE)))
         for first in range(0, len(planes), SECTIONS_AT_ONCE)
     )
     images = each_in_threads(photo_uri, pictures.of_sections(stacks, pictures.smoothing_px))
     captions = (f"{z:.4g} mm" for z in planes.z_mm)
-    panels = [{"image": image, "caption": text} for image, text in zip(images, captions, strict=True)]
+    panels = [*map(_panel, images, captions)]
     off_px = planes.total_disparity_px - outcome.sections.planes.total_disparity_px[0]
     return panels, int(np.abs(off_px).argmin())
 
 
-def input_panels(pictures: Pictures) -> list[Panel]:
+def _input_panels(pictures: Pictures) -> list[Panel]:
     """The view in the middle: its photons, and at full light."""
     dataset, step_px = pictures.outcome.dataset, pictures.step_px
     k, l = dataset.grid.middle_camera
@@ -139,15 +161,15 @@ def input_panels(pictures: Pictures) -> list[Panel]:
     if dataset.has_counts:
         view = dataset.counts.view(k, l)
         image = photon_picture(view[pictures.box], step_px)
-        panels.append(_drawing(image, f"view ({k}, {l}): {view.sum()} photons"))
+        panels.append(_panel(drawing_uri(image), f"view ({k}, {l}): {view.sum()} photons"))
     if dataset.views is not None:
         sums, samples = colours_and_samples(dataset.views.view(k, l), dataset.views.cfa)
         light = sums[pictures.box], samples[pictures.box]
-        panels.append(_photo(exposed([light], step_px)[0], f"view ({k}, {l}) at full light"))
+        panels.append(_panel(photo_uri(exposed([light], step_px)[0]), f"view ({k}, {l}) at full light"))
     return panels
 
 
-def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
+def _plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
     """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
     outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
     true, what = None, "objects"
@@ -160,21 +182,26 @@ def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]
         lights["full light (Eq. 2)"] = pictures.of_sections([outcome.full_light], 0.0)
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
-        sections = [_photo(light[plane], f"section at {z:g} mm, {words}") for words, light in lights.items()]
+        sections = [
+            _panel(photo_uri(light[plane]), f"section at {z:g} mm, {words}")
+            for words, light in lights.items()
+        ]
         if true is not None:
-            sections.append(_drawing(mask_image(middles(true[plane])), f"truth: {what} at {z:g} mm"))
+            sections.append(
+                _panel(drawing_uri(mask_image(middles(true[plane]))), f"truth: {what} at {z:g} mm")
+            )
         masks: list[Panel] = []
         for focus in outcome.focus:
             claim = middles(focus.in_focus[plane])
-            masks.append(_photo(images[plane] * claim[..., None], f"{focus.method}, {z:g} mm"))
+            masks.append(_panel(photo_uri(images[plane] * claim[..., None]), f"{focus.method}, {z:g} mm"))
             if true is not None:
                 image = agreement_image(claim, middles(true[plane]))
-                masks.append(_drawing(image, f"{focus.method}, {z:g} mm, compared with the truth"))
+                masks.append(_panel(drawing_uri(image), f"{focus.method}, {z:g} mm, compared with the truth"))
         planes.append((f"{z:g} mm", sections, masks))
     return planes
 
 
-def depth_panels(pictures: Pictures) -> list[Panel]:
+def _depth_panels(pictures: Pictures) -> list[Panel]:
     """The depth map, the truth and the error if there is a truth, and the confidence."""
     truth, depth = pictures.outcome.dataset.truth, pictures.outcome.depth
     z_mm, confidence = pictures.middles(depth.z_mm), pictures.middles(depth.confidence)
@@ -184,7 +211,10 @@ def depth_panels(pictures: Pictures) -> list[Panel]:
         true_mm = pictures.middles(truth.object_z_mm)
         caption = "true depth of the objects" if truth.has_objects else "true depth"
         panels.append(_map(caption, true_mm, *scale))
-        error, limit = depth_errors(z_mm, true_mm)
+        is_known = np.isfinite(z_mm) & np.isfinite(true_mm)
+        error = np.subtract(z_mm, true_mm, out=np.full(z_mm.shape, np.nan), where=is_known)
+        limit = float(np.quantile(np.abs(error[is_known]), UNSATURATED_SHARE)) if is_known.any() else 1.0
+        limit = float(f"{max(limit, 1e-3):.1e}")
         limits, label = (-limit, limit), "mm, too far above 0"
         panels.append(_map("estimated less true depth", error, ERROR_COLOURS, limits, label))
     confidence = np.where(np.isfinite(z_mm), confidence, np.nan)
@@ -192,24 +222,8 @@ def depth_panels(pictures: Pictures) -> list[Panel]:
     return [*panels, _map("confidence", confidence, SHARE_COLOURS, (0.0, 1.0), label)]
 
 
-def depth_errors(z_mm: np.ndarray, true_mm: np.ndarray) -> tuple[np.ndarray, float]:
-    """Estimated less true depth (H, W) in mm, NaN without either, and a limit that most errors are within.
-
-    These are `UNSATURATED_SHARE` of them; the limit is rounded to two digits.
-    """
-    both = np.isfinite(z_mm) & np.isfinite(true_mm)
-    error = np.full(z_mm.shape, np.nan)
-    error[both] = z_mm[both] - true_mm[both]
-    limit = float(np.quantile(np.abs(error[both]), UNSATURATED_SHARE)) if both.any() else 1.0
-    return error, float(f"{max(limit, 1e-3):.1e}")
-
-
-def _photo(image: np.ndarray, caption: str) -> Panel:
-    return {"image": photo_uri(image), "caption": caption}
-
-
-def _drawing(image: np.ndarray, caption: str) -> Panel:
-    return {"image": drawing_uri(image), "caption": caption}
+def _panel(uri: str, caption: str) -> Panel:
+    return {"image": uri, "caption": caption}
 
 
 def _map(
@@ -221,4 +235,4 @@ def _map(
     confidence: np.ndarray | None = None,
 ) -> Panel:
     image = map_image(values, colours, limits, confidence)
-    return _drawing(image, caption) | {"bar": colour_bar_uri(colours, limits, label)}
+    return _panel(drawing_uri(image), caption) | {"bar": colour_bar_uri(colours, limits, label)}

@@ -226,6 +226,9 @@ def score(dataset: DatasetFolder, out: Path) -> None:
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
 
 
+STEPS = (run, reconstruct, depth, segment, score)
+
+
 def _opened(folder: Path, budget: str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     dataset = open_dataset(folder)

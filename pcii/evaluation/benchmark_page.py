@@ -1,13 +1,14 @@
 """One page of all submissions in a folder: lines over light, tables, ranks, and commands."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pcii.base import InputError, write_bytes_safely
+from pcii.evaluation import summary
 from pcii.evaluation.benchmark_scores import (
     SUBMISSION,
     TYPICAL_PHOTONS,
@@ -16,10 +17,8 @@ from pcii.evaluation.benchmark_scores import (
     read_submission,
 )
 from pcii.evaluation.evaluation_page import accuracy_plot, light_name, mean_table, rank_table
-from pcii.evaluation.measures import AXES, DECISIVE, LOOK_AT_NO_PHOTON, Kind, with_yardsticks
 from pcii.evaluation.method_names import estimator_of, known_methods
 from pcii.evaluation.rows import Row, frame_of, read_rows
-from pcii.evaluation.summary import means, means_over_scenes, ranked_over, ranks
 from pcii.figures import NOT_KNOWN, render_page, text_table
 from pcii.store import IN_FRAMES, ROWS, verify
 
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 MIN_PX = 1e-3
 """Smaller errors of depth count as this one where they are averaged as logarithms."""
-GEOMETRIC: Mapping[str, Kind] = {"median_px": "geometric"}
+GEOMETRIC: Mapping[str, summary.Kind] = {"median_px": "geometric"}
 BOUNDS = {"median_px": "bound_px"}
 """Measures with a bound, and the measure that is theirs."""
 BOUND = "bound for whole objects (Cramér-Rao)"
@@ -65,20 +64,29 @@ def write_page(folder: Path, out: Path) -> int:
                 f"{inside / ROWS}: has rows of {min(unnamed)!r}, which {SUBMISSION} does not name"
             )
         rows += new_rows
-    frame = with_yardsticks(frame_of(rows))
+    frame = summary.with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
     first = next(iter(submissions.values()))
-    cell_means = means(frame)
+    pairs = sorted({(row["machine"], row["method"]) for row in rows if row.get("machine")})
+    cell_means = summary.means(frame)
     content = {
         "benchmark": first.benchmark,
         "half": first.half,
         "scenes": of_scenes["scene"].nunique(),
         "comparisons": {
-            measure: _compare(measure, cell_means) for measure in AXES if measure in {*cell_means["measure"]}
+            measure: _compare(measure, cell_means)
+            for measure in summary.AXES
+            if measure in {*cell_means["measure"]}
         },
-        "ranks": dict(_ranks(of_scenes, measure) for measure in DECISIVE),
-        "machines": _machines(rows),
+        "ranks": {
+            f"{title} over all {unit}": rank_table(summary.ranks(of_scenes, measure), unit)
+            for measure, title in summary.DECISIVE.items()
+            for unit in [summary.ranked_over(of_scenes, measure)]
+        },
+        "machines": {
+            machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))
+        },
         "submissions": _submission_table(submissions, frame),
     }
     write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
@@ -93,7 +101,7 @@ def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:
     of_scenes = values[~values["scene"].astype(str).str.endswith(IN_FRAMES)]
     is_geometric = of_scenes["measure"].isin(list(GEOMETRIC))
     of_scenes = of_scenes.assign(mean=of_scenes["mean"].mask(is_geometric, of_scenes["mean"].clip(MIN_PX)))
-    over_scenes = means_over_scenes(of_scenes, GEOMETRIC)
+    over_scenes = summary.means_over_scenes(of_scenes, GEOMETRIC)
     accuracy = over_scenes[over_scenes["measure"] == measure]
     is_time = (over_scenes["measure"] == "seconds") & (over_scenes["light"] == TYPICAL_PHOTONS)
     times = over_scenes[is_time].assign(column=f"seconds at {TYPICAL_PHOTONS:g}")
@@ -102,10 +110,9 @@ def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:
     by_light["column"] = pd.Categorical(by_light["column"], columns)
     at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
     tables: dict[str, DataFrame] = {}
-    scenes = of_scenes["scene"].nunique()
     if len(by_light):
-        title = "By photons per view"
-        tables[title] = mean_table(by_light, ["method"], "column", full_n=scenes, bound=BOUND)
+        full_n = of_scenes["scene"].nunique()
+        tables["By photons per view"] = mean_table(by_light, ["method"], "column", full_n=full_n, bound=BOUND)
     if len(at_typical):
         title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
         tables[title] = mean_table(at_typical, ["scene"], "method", bound=BOUND)
@@ -122,7 +129,7 @@ def _values(measure: str, cell_means: "DataFrame") -> "DataFrame":
 
     cells = means_of(measure)[["scene", "light", "method"]]
     values = means_of(measure, "photons_per_view", "seconds").merge(cells)
-    methods = sorted(cells["method"].unique(), key=lambda name: (name in LOOK_AT_NO_PHOTON, name))
+    methods = sorted(cells["method"].unique(), key=lambda name: (name in summary.LOOK_AT_NO_PHOTON, name))
     bounds = means_of(BOUNDS.get(measure, "")).merge(cells).drop_duplicates(["scene", "light"], keep="last")
     if len(bounds):
         photons = means_of("photons_per_view").merge(bounds[["scene", "light", "method"]])
@@ -130,17 +137,6 @@ def _values(measure: str, cell_means: "DataFrame") -> "DataFrame":
         values = pd.concat([values, bounds.assign(method=BOUND)])
         methods.append(BOUND)
     return values.assign(method=pd.Categorical(values["method"], methods))
-
-
-def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
-    unit = ranked_over(frame, measure)
-    return f"{DECISIVE[measure]} over all {unit}", rank_table(ranks(frame, measure), unit)
-
-
-def _machines(rows: Sequence[Row]) -> dict[str, list[str]]:
-    """Methods by the machines that their seconds are of."""
-    pairs = sorted({(row["machine"], row["method"]) for row in rows if row.get("machine")})
-    return {machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))}
 
 
 def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "DataFrame") -> "DataFrame":

@@ -18,7 +18,6 @@ from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent
 from pcii.depth import check_range_mm, estimate_depth
 from pcii.evaluation import summary
 from pcii.evaluation.evaluation_page import accuracies, write_evaluation
-from pcii.evaluation.measures import AXES, kind_of, with_yardsticks
 from pcii.evaluation.method_names import (
     Method,
     NamedMethod,
@@ -28,7 +27,7 @@ from pcii.evaluation.method_names import (
     software_of,
 )
 from pcii.evaluation.rows import Key, Row, RowFile, frame_of, key_of, leaves, origin_of, writing_rows
-from pcii.figures import draw_accuracy, in_style, known_places, several_axes
+from pcii.figures import draw_accuracy, in_style
 from pcii.metrics import object_bounds, score
 from pcii.removal import segment
 from pcii.sections import reconstruct
@@ -79,16 +78,16 @@ class Evaluation:
     def means(self, by: Sequence[str] = summary.CELL) -> "DataFrame":
         """Means of every measure over datasets, with their 95 % intervals: see `summary.means`.
 
-        Methods are joined by yardsticks, which look at no photon: see `measures.YARDSTICKS`.
+        Methods are joined by yardsticks, which look at no photon: see `summary.YARDSTICKS`.
         """
-        return summary.means(with_yardsticks(self.frame), by)
+        return summary.means(summary.with_yardsticks(self.frame), by)
 
     def ranks(self, measure: str = "iou", over: summary.Over | None = None) -> "DataFrame":
         """Methods by their mean over scenes, or of one scene over datasets, compared with the best one.
 
         `over` says which: "scenes" or "datasets". See `summary.ranks`.
         """
-        return summary.ranks(with_yardsticks(self.frame), measure, over)
+        return summary.ranks(summary.with_yardsticks(self.frame), measure, over)
 
     def plot(self, measure: str = "iou", axes: Any = None, *, style: str = "screen") -> "np.ndarray":
         """Draw a measure against photons per view, and against seconds, and return Matplotlib's axes (N,).
@@ -99,16 +98,14 @@ class Evaluation:
         `evaluation.plot("iou", style="paper")[0].figure.savefig("iou.pdf")`, or .svg. Raises `InputError` for
         another measure or style, a measure that no method has, and other axes or another number of them.
         """
-        if measure not in AXES:
-            raise InputError(f"measure: expected one of {', '.join(AXES)}, got {measure!r}")
+        if measure not in summary.AXES:
+            raise InputError(f"measure: expected one of {', '.join(summary.AXES)}, got {measure!r}")
         cells = accuracies(summary.over_scenes(self.means()), measure)
-        if not (places := known_places(cells)):
-            raise InputError(f"measure: no method has {measure!r}")
-        methods = sorted(cells["method"].unique())
+        methods, is_share = sorted(cells["method"].unique()), summary.kind_of(measure) != "positive"
         with in_style(style):
-            panels = several_axes(axes, len(places))
-            is_share = kind_of(measure) != "positive"
-            draw_accuracy(panels, cells, methods, AXES[measure], is_share=is_share)
+            panels = draw_accuracy(axes, cells, methods, summary.AXES[measure], is_share=is_share)
+        if not len(panels):
+            raise InputError(f"measure: no method has {measure!r}")
         return panels
 
 

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base import sweep_temporaries, write_bytes_safely
-from pcii.evaluation.measures import (
-    AXES,
-    DECISIVE,
-    MEASURES,
-    MORE_IS_BETTER,
-    SIMPLE,
-    kind_of,
-    with_yardsticks,
-)
-from pcii.evaluation.summary import Over, lines_of, means, over_scenes, ranked_over, ranks
+from pcii.evaluation import summary
 from pcii.figures import (
     NOT_KNOWN,
     PLACES,
@@ -50,13 +41,13 @@ def write_evaluation(
     `others` are further files to list. The caller keeps others from adding rows meanwhile.
     """
     sweep_temporaries(out)
-    frame = with_yardsticks(frame)
-    cell_means = means(frame)
+    frame = summary.with_yardsticks(frame)
+    cell_means = summary.means(frame)
     differing = ", ".join(origin["differing"])
     warning = f"Not all rows are of the same software ({differing}): name all datasets and methods again."
     content = {
         "warnings": [warning] if differing else [],
-        "charts": {words: chart for words, chart in _charts(over_scenes(cell_means)) if chart},
+        "charts": {words: chart for words, chart in _charts(summary.over_scenes(cell_means)) if chart},
         "tables": dict(_tables_of(frame, cell_means)),
         "origin": _origin_table(origin, hash_file(out / ROWS)),
     }
@@ -72,28 +63,26 @@ def write_evaluation(
 def _charts(table: "DataFrame") -> Iterator[tuple[str, str]]:
     """What a chart of means by method and light shows, and the chart; empty if nothing is known of it."""
     methods: list[str] = []
-    for measure in DECISIVE:
+    for measure in summary.DECISIVE:
         methods = sorted(table["method"][table["measure"] == measure].unique())
-        yield f"{AXES[measure]} against photons and time", accuracy_plot(table, methods, measure)
+        yield f"{summary.AXES[measure]} against photons and time", accuracy_plot(table, methods, measure)
     yield "share of correct depths against confidence, by light", _calibration_plot(table, methods)
 
 
 def _origin_table(origin: Mapping[str, Any], rows_sha256: str) -> "DataFrame":
     """What an evaluation was made by; `rows_sha256` is that of its rows.jsonl."""
+
+    def listed(rows_by_text: Mapping[str, int]) -> str:
+        is_one = len(rows_by_text) == 1
+        return "; ".join(text if is_one else f"{text} ({n} rows)" for text, n in rows_by_text.items())
+
     rows = {
         "measured": " to ".join(dict.fromkeys(origin["days"])),
-        "machine": _with_row_counts(origin["machines"]),
-        **{name: _with_row_counts(numbers) for name, numbers in origin["software"].items()},
+        "machine": listed(origin["machines"]),
+        **{name: listed(numbers) for name, numbers in origin["software"].items()},
         "SHA-256 of rows.jsonl": rows_sha256,
     }
     return text_table([row for row in rows.items() if row[1]], ("what", "value"), words=2)
-
-
-def _with_row_counts(rows_by_text: Mapping[str, int]) -> str:
-    """Texts, with the number of rows of each where they are several."""
-    if len(rows_by_text) == 1:
-        return next(iter(rows_by_text))
-    return "; ".join(f"{text} ({rows} rows)" for text, rows in rows_by_text.items())
 
 
 def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> str:
@@ -101,8 +90,8 @@ def accuracy_plot(table: "DataFrame", methods: Sequence[str], measure: str) -> s
 
     `table` has means by method, light and measure. Empty if no method has the measure.
     """
-    cells = accuracies(table, measure)
-    figure = accuracy_chart(cells, methods, AXES[measure], is_share=kind_of(measure) != "positive")
+    cells, is_share = accuracies(table, measure), summary.kind_of(measure) != "positive"
+    figure = accuracy_chart(cells, methods, summary.AXES[measure], is_share=is_share)
     return "" if figure is None else figure_uri(figure)
 
 
@@ -151,45 +140,36 @@ def light_name(light: float | str) -> str:
 def _tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
     """Of removal, then of depth: ranks, the decisive measure by scene and light, and all measures.
 
-    Each has its title. `frame` is of `summary.with_yardsticks`, `cell_means` its means by scene, light and
-    method.
+    Each has its title. `frame` has yardsticks; `cell_means` are its means by scene, light and method.
     """
-    for (decisive, title), task in zip(DECISIVE.items(), ("removal", "depth"), strict=True):
+    import pandas as pd
+
+    for (decisive, title), task in zip(summary.DECISIVE.items(), ("removal", "depth"), strict=True):
         means = cell_means[cell_means["measure"] == decisive]
         if not len(means):
             continue
-        ranked = ranks(frame, decisive)
+        unit, ranked = summary.ranked_over(frame, decisive), summary.ranks(frame, decisive)
         if len(ranked):
-            unit = ranked_over(frame, decisive)
             yield f"{title}, methods compared on the same {unit}", rank_table(ranked, unit)
         yield f"{title} by photons per view", mean_table(means, ["scene", "method"], "light", light_name)
         if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
-            yield f"{title} beside other measures", _measure_table(cell_means, means, task)
+            columns = {each.name: each.column for each in summary.MEASURES if each.of in (task, "both")}
+            is_of_task = cell_means["method"].isin(means["method"].unique())
+            shown = cell_means[cell_means["measure"].isin([*columns]) & is_of_task]
+            shown = shown.assign(measure=pd.Categorical(shown["measure"], [*columns]))
+            table = mean_table(shown, ["scene", "light", "method"], "measure", columns.__getitem__)
+            yield f"{title} beside other measures", table
 
 
 def decisive_means(cell_means: "DataFrame") -> Iterator[tuple[str, str]]:
     """Of removal, then of depth, as far as there is any: a title, and means by method and light as lines."""
-    means = over_scenes(cell_means)
-    for measure, title in DECISIVE.items():
+    means = summary.over_scenes(cell_means)
+    for measure, title in summary.DECISIVE.items():
         of_measure = means[means["measure"] == measure]
         if len(of_measure):
-            table = of_measure.pivot(index="method", columns="light", values="mean").sort_index(
-                axis="columns"
-            )
-            table = table.rename(columns={light: light_name(light) for light in table.columns})
-            table.index.name = table.columns.name = None
+            table = of_measure.pivot(index="method", columns="light", values="mean").sort_index(axis=1)
+            table = table.rename(columns=light_name).rename_axis(index=None, columns=None)
             yield title, table.to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
-
-
-def _measure_table(cell_means: "DataFrame", means: "DataFrame", task: str) -> "DataFrame":
-    """All measures of removal or of depth of the methods in `means`, by scene, light and method."""
-    import pandas as pd
-
-    names = {measure.name: measure.column for measure in MEASURES if measure.of in (task, "both")}
-    is_shown = cell_means["measure"].isin(list(names)) & cell_means["method"].isin(means["method"].unique())
-    shown = cell_means[is_shown]
-    shown = shown.assign(measure=pd.Categorical(shown["measure"], list(names)))
-    return mean_table(shown, ["scene", "light", "method"], "measure", lambda name: names[name])
 
 
 def mean_table(
@@ -210,8 +190,8 @@ def mean_table(
 
     contest = [key for key in ("scene", "light", "measure") if key in means]
     methods = means["method"].astype(object)
-    is_simple = methods.isin(SIMPLE)
-    values = means["mean"].where(means["measure"].isin(MORE_IS_BETTER) & (methods != bound))
+    is_simple = methods.isin(summary.SIMPLE)
+    values = means["mean"].where(means["measure"].isin(summary.MORE_IS_BETTER) & (methods != bound))
 
     def best_of(some: "Series") -> "Series":
         return some.groupby([means[key] for key in contest], observed=True).transform("max")
@@ -219,7 +199,9 @@ def mean_table(
     is_best = (values == best_of(values)) & (values > -best_of(-values))
     is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
     texts: list[str] = []
-    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
+    for row in summary.lines_of(
+        means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)
+    ):
         number = f" of {row.n}" if row.n < full_n else ""
         text = with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
         texts.append(emphasised(text) if row.is_best else text)
@@ -231,7 +213,7 @@ def mean_table(
     return table.set_index([*rows])
 
 
-def rank_table(table: "DataFrame", unit: Over) -> "DataFrame":
+def rank_table(table: "DataFrame", unit: str) -> "DataFrame":
     """Methods ranked over scenes or datasets; `table` is of `summary.ranks`."""
     rows = [
         (
@@ -243,7 +225,7 @@ def rank_table(table: "DataFrame", unit: Over) -> "DataFrame":
             *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
             str(row.n),
         )
-        for row in lines_of(table)
+        for row in summary.lines_of(table)
     ]
     header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible", unit)
     return text_table(rows, header)

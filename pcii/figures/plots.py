@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base import InputError, evenly_chosen, in_html
-from pcii.figures.panels import (
+from pcii.figures.charts import (
     COLOURS,
     GRID_COLOUR,
     MAX_PANELS,

@@ -52,19 +52,12 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
 
     The objects' pixels are those with a `Truth.object_z_mm`: all with a true depth, if no object is known.
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
-    since a dark backdrop has no photons to estimate depth from.
-    `within_1px` and `within_3px` are the shares of the pixels whose depth is as near to the truth, in px of
-    total disparity, and `bad_1px` and `bad_3px` the other pixels; `coverage` is the share with an estimate.
-    `median_mm` and `median_px` are medians of the absolute errors of all pixels, None where most have no
-    estimate; of the pixels with an estimate `mae_mm` and `mae_px` are the mean absolute errors, `bias_mm` and
-    `bias_px` the medians of signed errors, above 0 where depths are too far.
-    `brier` is the score of Brier (1950) of the confidence that a depth is within 1 px: the mean of (c - y)^2,
-    c the confidence, 0 without an estimate, and y 1 where that is so, else 0. Less is better, but it is 0
-    for who never answers. `quadratic_score`, within_1px - brier, is the mean of 2 c y - c^2 and as proper: 0
-    without answers, 1 if all are right and sure, below 0 if they are less often right than half of what
-    their confidence says.
-    `one_depth` has what the best answer of one depth everywhere would have, with the best confidence. All are
-    None without a depth map, and where no true depth is known.
+    since a dark backdrop has no photons to estimate depth from. Errors in px are of total disparity; signed
+    ones are above 0 where depths are too far. `brier` is the score of Brier (1950) of the confidence c that a
+    depth is within 1 px, the mean of (c - y)^2, y 1 where that is so, else 0; `quadratic_score`, within_1px -
+    brier, is the mean of 2 c y - c^2 and as proper. `one_depth` has what the best answer of one depth
+    everywhere would have, with the best confidence. docs/scores.md has every key. All are None without a
+    depth map, and where no true depth is known.
     """
     errors: dict[str, Any] = dict.fromkeys(MEASURES)
     errors["one_depth"] = dict.fromkeys(ONE_DEPTH_MEASURES)
@@ -278,7 +271,8 @@ def _texture(
     counts, coverage = full_light.counts[plane][box], full_light.coverage[plane][box]
     smooth = {"sigma": (TEXTURE_SIGMA_PX, TEXTURE_SIGMA_PX, 0), "mode": "constant"}
     samples = gaussian_filter(coverage.astype(np.float64), **smooth)
-    rate = gaussian_filter(counts.astype(np.float64), **smooth) / np.maximum(samples, 1e-9)
+    smoothed = gaussian_filter(counts.astype(np.float64), **smooth)
+    rate: np.ndarray = np.asarray(smoothed) / np.maximum(samples, 1e-9)
     weight = coverage[inside].mean(axis=0, dtype=np.float64)
     light = float((weight * rate[inside]).sum())
     if light <= 0:

@@ -38,16 +38,11 @@ def score(
 ) -> Score:
     """Compare in-focus masks and a depth map with the truth.
 
-    `planes` has a row for each method, plane and kind of truth. "object": the objects that belong to this
-    plane (`TrueFocus.plane_of`). "pixel": the points whose blur half-extent,
-    `|disparity(z) - disparity(z0)| (N - 1) / 2`, is at most 1 px. `mask_agreement` says how masks are
-    compared, with outlines of a tolerance of 2 px, located within pixels if the truth has `coverage`;
-    `entropy_before` and `entropy_after` are Eq. 9 of the section as a whole, before and after removal, in
-    bits; `claimed_share` is the share of the section that the mask keeps. `objects` is Table 1: the entropy
-    at each plane of the region of each object that is scored, which includes its blur at the other planes.
-    `depth` is `depth_errors`. `bounds` holds `depth_sigma_px` for each object, the least standard deviation
-    of its depth, from its texture in `full_light`, the sections of the radiance (Eq. 2). `readout` has the
-    frames of the counts.
+    `planes` has a row for each method, plane and kind of truth, by object and by pixel (`TrueFocus`), of
+    `mask_agreement`, photons, and Eq. 9 of the section before and after removal, in bits. `objects` is
+    Table 1: the entropy at each plane of the region of each object that is scored, which includes its blur at
+    the other planes. `depth` is `depth_errors`, `bounds` is `object_bounds`, by textures in `full_light`, the
+    sections of the radiance (Eq. 2). docs/scores.md has every key.
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.
@@ -87,18 +82,18 @@ def score(
         for each in methods:
             if each.sections is sections:
                 rows += _plane_rows(each, pooled, true)
-    object_rows: list[dict[str, Any]] = []
-    if truth is not None:
-        object_rows = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    bounds = {"objects": object_rows}
-    readout = asdict(methods[0].sections.readout) if methods else None
+    first = methods[0].sections if methods else None
+    bounds = {"objects": [] if truth is None else object_bounds(truth, full_light, first)}
+    readout = None if first is None else asdict(first.readout)
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
 
 def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) -> list[dict[str, Any]]:
-    before, after = _section_entropies(focus, pooled)
     rows: list[dict[str, Any]] = []
+    maxima = pooled.max(axis=1).max(axis=1)  # ten times faster than max over both axes at once
     for plane, depth in enumerate(focus.z_mm):
+        removed = pooled[plane] * focus.in_focus[plane][..., None]
+        before, after = (_mean_entropy_bits(each, maxima[plane]) for each in (pooled[plane], removed))
         photons = _photon_agreement(focus, true, plane)
         for kind in KINDS:
             names = [] if true is None or kind == "pixel" else true.names_at(plane)
@@ -115,8 +110,8 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
                     "truth": kind,
                     **mask_agreement(focus.in_focus[plane], mask, share, is_free),
                     **photons[kind],
-                    "entropy_before": before[plane],
-                    "entropy_after": after[plane],
+                    "entropy_before": before,
+                    "entropy_after": after,
                     "claimed_share": float(focus.in_focus[plane].mean()),
                 }
             )
@@ -140,16 +135,9 @@ def object_share(mask: np.ndarray, object_id: np.ndarray, coverage: np.ndarray) 
     return coverage * mask + (1 - coverage) * masked_count / np.maximum(other_count, 1)
 
 
-def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
-    """Entropy of each section before and after removal, mean over the colours, in bits."""
-    maxima = pooled.max(axis=1).max(axis=1)  # ten times faster than max over both axes at once
-    before: list[float] = []
-    after: list[float] = []
-    for plane, mask, maximum in zip(pooled, focus.in_focus, maxima, strict=True):
-        colours = range(plane.shape[-1])
-        before.append(float(np.mean([entropy_bits(plane[..., c], maximum[c]) for c in colours])))
-        after.append(float(np.mean([entropy_bits(plane[..., c] * mask, maximum[c]) for c in colours])))
-    return before, after
+def _mean_entropy_bits(section_HWC: np.ndarray, maxima: np.ndarray) -> float:
+    """Eq. 9, mean over the colours."""
+    return float(np.mean([entropy_bits(section_HWC[..., c], top) for c, top in enumerate(maxima)]))
 
 
 def _object_rows(sections: Sections, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
@@ -174,10 +162,8 @@ def mask_agreement(
     """IoU, precision, recall, F1 and boundary F of two masks (H, W) bool, and what is claimed falsely.
 
     `true_share` (H, W) is the true share of each pixel's area, where that is known. Pixels `is_free` (H, W)
-    count as if they were not claimed. `false_share` is the share of the film that is claimed and not true,
-    and `everything` the IoU and the false share of whoever claims the whole film. Where nothing is true there
-    is neither IoU, recall, F1 nor boundary F, and where nothing is claimed no precision; all are None without
-    truth.
+    count as if they were not claimed. `everything` is the IoU and the false share of whoever claims the whole
+    film. What has nothing to be a share of is None, as all are without truth.
 
     >>> agreement = mask_agreement(np.array([[True, True, False]]), np.array([[True, False, False]]))
     >>> agreement["iou"], agreement["precision"], agreement["recall"]
