@@ -85,11 +85,11 @@ class Pictures:
     def middles(self, image: np.ndarray) -> np.ndarray:
         """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
         image = image[self.box]
-        rows, cols = (
-            np.minimum(np.arange(0, size, self.step_px) + self.step_px // 2, size - 1)
-            for size in image.shape[:2]
+        starts = (np.arange(0, size, self.step_px) for size in image.shape[:2])
+        middles = (
+            np.minimum(start + self.step_px // 2, image.shape[axis] - 1) for axis, start in enumerate(starts)
         )
-        return image[rows][:, cols]
+        return image[np.ix_(*middles)]
 
     def of_sections(self, stacks: Iterable[Sections], smoothing_px: float) -> list[np.ndarray]:
         """8-bit pictures of all sections of some stacks, at the same exposure.

@@ -11,7 +11,7 @@ from .executor import Executor as Executor, THIS_PROCESS as THIS_PROCESS
 from .executor import threads_of_worker as threads_of_worker
 from .extensions import MethodRegistry as MethodRegistry, called as called, load_function as load_function
 from .extensions import name_of as name_of, package_of as package_of, registered as registered
-from .plain_text import in_html as in_html, in_markdown as in_markdown, is_plain as is_plain
+from .plain_text import in_html as in_html, in_markdown as in_markdown
 from .plain_text import is_plain_name as is_plain_name, visible as visible, web_address as web_address
 from .progress import Report as Report, Stages as Stages, silent as silent
 from .safe_files import json_bytes as json_bytes, locked as locked, named_in_errors as named_in_errors

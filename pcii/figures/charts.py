@@ -120,9 +120,8 @@ def figure_uri(figure: "Figure") -> str:
 def colour_bar_uri(colours: str, limits: tuple[float, float], label: str) -> str:
     """A colour bar with ticks, alone and lying, as a data URI for HTML."""
     figure = new_figure(3.8, 0.62, "constrained")
-    figure.colorbar(
-        colour_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label
-    )
+    scale, bar = colour_scale(colours, limits), figure.subplots()
+    figure.colorbar(scale, cax=bar, orientation="horizontal", label=label)
     return figure_uri(figure)
 
 
@@ -265,11 +264,8 @@ def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":
 
 def _line_style(number: int) -> dict[str, Any]:
     """Colour, marker and line of a method by its number."""
-    return {
-        "color": COLOURS[number % len(COLOURS)],
-        "marker": MARKERS[number % len(MARKERS)],
-        "linestyle": "-" if number < len(COLOURS) else "--",
-    }
+    looks = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
+    return looks | {"linestyle": "-" if number < len(COLOURS) else "--"}
 
 
 def _add_legend(figure: "Figure", handles: Mapping[str, Any], columns: int) -> None:

@@ -265,14 +265,13 @@ def _texture(
     box = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
     blur = blur_half_extent_px(full_light.grid, truth.z_mm[box], full_light.z_mm[plane])
     sharp = (truth.object_id[box] == number) & (blur <= FOCUS_TOLERANCE_PX)
-    inside = binary_erosion(sharp, iterations=AWAY_FROM_EDGES_PX)
+    inside = np.asarray(binary_erosion(sharp, iterations=AWAY_FROM_EDGES_PX), dtype=bool)
     if not inside.any():
         return None
     counts, coverage = full_light.counts[plane][box], full_light.coverage[plane][box]
     smooth = {"sigma": (TEXTURE_SIGMA_PX, TEXTURE_SIGMA_PX, 0), "mode": "constant"}
     samples = gaussian_filter(coverage.astype(np.float64), **smooth)
-    smoothed = gaussian_filter(counts.astype(np.float64), **smooth)
-    rate: np.ndarray = np.asarray(smoothed) / np.maximum(samples, 1e-9)
+    rate = gaussian_filter(counts.astype(np.float64), **smooth) / np.maximum(samples, 1e-9)
     weight = coverage[inside].mean(axis=0, dtype=np.float64)
     light = float((weight * rate[inside]).sum())
     if light <= 0:
