@@ -5,9 +5,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from pcii.app.command_options import Out, SectionDepths, Workers
 from pcii.app.import_commands import import_dataset
-from pcii.app.step_commands import STEPS
+from pcii.app.step_commands import STEPS, Out, SectionDepths, Workers
 from pcii.base import THIS_PROCESS, Stages, command_line, results_folder, say, say_next, say_next_page
 from pcii.evaluation import (
     Evaluation,

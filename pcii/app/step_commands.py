@@ -1,21 +1,26 @@
-"""Commands that analyse one dataset: all steps, sections, depth, removal, score."""
+"""Commands that analyse one dataset: all steps, sections, depth, removal, score; and options of commands."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import CoercionError, Parameter, Token
 
 from pcii.app import results
-from pcii.app.command_options import (
-    Budget,
-    DatasetFolder,
-    DepthRange,
-    ExpectedDepths,
-    ResultsOut,
-    SectionDepths,
-)
 from pcii.app.pipeline import full_light_sections, surface_depths
 from pcii.app.report import result_tables
-from pcii.base import InputError, Stages, say, say_next, say_next_page, write_bytes_safely, write_json_safely
+from pcii.base import (
+    Executor,
+    InputError,
+    Stages,
+    say,
+    say_next,
+    say_next_page,
+    write_bytes_safely,
+    write_json_safely,
+)
 from pcii.depth import DEFAULT_METHOD, estimate_depth
 from pcii.figures import draw_depth, exposed, figure_bytes, mask_image, new_figure, write_png
 from pcii.metrics import scoring
@@ -31,12 +36,79 @@ from pcii.store import (
     planes_of,
     read_results,
 )
-from pcii.types import DepthMap, FocalPlanes, Light, Segmented
+from pcii.types import MOST_DEPTHS, DepthMap, FocalPlanes, Light, Segmented
 
 DEPTH_IN = 9.0
 """Longest side of the picture of a depth map with its scale."""
 MIN_ANSWERED_SHARE = 0.1
 """Smallest share of the photons that a depth map answers for without a warning."""
+
+
+def depths_mm(text: str) -> list[float]:
+    """Depths as they are typed: one number, or start:stop:step with the stop if a step meets it.
+
+    Raises ValueError for anything else.
+
+    >>> depths_mm("540"), depths_mm("500:560:20"), depths_mm("500:550:20")
+    ([540.0], [500.0, 520.0, 540.0, 560.0], [500.0, 520.0, 540.0])
+    """
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        return numbers
+    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
+        start, stop, step = numbers
+        if step > 0 and start <= stop and (stop - start) / step < MOST_DEPTHS:
+            # Steps such as 0.1 are not exact in binary; the stop counts as met within a millionth of a step.
+            return [start + number * step for number in range(math.floor((stop - start) / step + 1e-6) + 1)]
+    raise ValueError(
+        "expected a depth in mm such as 540, or start:stop:step such as 500:700:20 of at most "
+        f"{MOST_DEPTHS} depths, got {text!r}"
+    )
+
+
+def _all_depths_mm(kind: Any, tokens: Sequence[Token]) -> tuple[float, ...]:
+    depths: list[float] = []
+    for token in tokens:
+        try:
+            depths += depths_mm(token.value)
+        except ValueError as fault:  # with the token, so that the option is named whichever value is wrong
+            raise CoercionError(msg=str(fault), token=token) from None
+    return tuple(depths)
+
+
+Workers = Annotated[Executor, Parameter(name="*")]
+Out = Annotated[Path, Parameter(name=("--out", "-o"))]
+ResultsOut = Annotated[Out, Parameter(help="Folder for the results: new, or with results of this dataset.")]
+DatasetFolder = Annotated[Path, Parameter(help="A dataset folder.")]
+Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm", converter=_all_depths_mm)]
+SectionDepths = Annotated[
+    Depths,
+    Parameter(
+        help="Depth of a section in mm, or start:stop:step; repeat for more. Default: those that the dataset "
+        "suggests."
+    ),
+]
+ExpectedDepths = Annotated[
+    Depths,
+    Parameter(
+        help="Depth in mm of a plane in which objects are expected, or start:stop:step; repeat for more. "
+        "Default: those that the dataset suggests. Only the method posterior uses them."
+    ),
+]
+DepthRange = Annotated[
+    tuple[float, float] | None,
+    Parameter(
+        help="Nearest and farthest depth to search, in mm. Default: the range that the dataset suggests, or "
+        "4/5 of its nearest to 5/4 of its farthest depth."
+    ),
+]
+Budget = Annotated[
+    str | None,
+    Parameter(help="Use the photons of this smaller, nested budget, or full-light: the radiance alone."),
+]
 
 
 def run(
@@ -206,8 +278,8 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
-    data, manifest = open_dataset(dataset), read_results(out)
-    data = data if manifest.light is None else data.at_light(Light.parse(manifest.light))
+    manifest = read_results(out)
+    data = _opened(dataset, manifest.light)
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")
@@ -215,9 +287,8 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     planes = focus[0].sections.planes if focus else planes
     with results.writing(out, data) as folder:
         full_light = full_light_sections(data, planes) if data.truth and planes else None
-        result = scoring.score(
-            focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
-        )
+        options = {"grid": data.grid, "full_light": full_light, "dataset": data.name}
+        result = scoring.score(focus, depth_map, data.truth, **options)
         write_json_safely(folder / results.SCORE, result.to_dict())
     say(f"{out / results.SCORE}")
     if data.truth is None:
@@ -229,7 +300,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
 STEPS = (run, reconstruct, depth, segment, score)
 
 
-def _opened(folder: Path, budget: str | None) -> Dataset:
+def _opened(folder: Path, budget: float | str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     dataset = open_dataset(folder)
     return dataset if budget is None else dataset.at_light(Light.parse(budget))
@@ -246,16 +317,13 @@ def _warn_of_few_depths(depth_map: DepthMap, data: Dataset, z_range_mm: tuple[fl
     if data.has_counts:  # in the dark there is nothing to answer for
         weight = reconstruct_sections(data.counts, float(np.mean(z_range_mm))).counts[0].sum(axis=-1)
     share = float(weight[np.isfinite(depth_map.z_mm)].sum() / max(weight.sum(), 1))
-    if share >= MIN_ANSWERED_SHARE:
-        return
+    what, reason = "pixels", "the views show too little texture"
+    if data.has_counts:
+        what, reason = "photons", f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
     if min(grid.rows, grid.cols) == 1:
         reason = f"the {grid.rows} x {grid.cols} cameras stand in a line, and see depth at few edges"
-    elif data.has_counts:
-        reason = f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
-    else:
-        reason = "the views show too little texture"
-    what = "photons" if data.has_counts else "pixels"
-    say(f"warning: {share:.1%} of the {what} have a depth, most likely since {reason}")
+    if share < MIN_ANSWERED_SHARE:
+        say(f"warning: {share:.1%} of the {what} have a depth, most likely since {reason}")
 
 
 def _say_next_score(data: Dataset, out: Path) -> None:
