@@ -182,7 +182,7 @@ def reconstruct(
     planes = planes_of(data, z_mm)
     with results.writing(out, data) as folder:
         sections = reconstruct_sections(data.counts_or_views, planes, subpixel=subpixel)
-        results.save_sections(folder, sections)
+        results.save_result(folder, sections)
         pictures = exposed(zip(sections.counts, sections.coverage, strict=True), 1)
         for z, picture in zip(sections.z_mm, pictures, strict=True):
             write_png(folder / f"section_{z:g}mm.png", picture)
@@ -221,7 +221,7 @@ def depth(
     planes = planes_of(data, z_mm) if has_depths(data, z_mm) else None
     with results.writing(out, data) as folder:
         depth_map = estimate_depth(data.counts_or_views, (near, far), z_mm=planes, method=method)
-        results.save_depth(folder, depth_map)
+        results.save_result(folder, depth_map)
         figure = new_figure(DEPTH_IN, DEPTH_IN, "compressed")
         draw_depth(depth_map, figure.subplots(), (near, far))
         write_bytes_safely(folder / "depth.png", figure_bytes(figure))
@@ -257,7 +257,7 @@ def segment(
     with results.writing(out, data) as folder:
         z_range_mm = depth_range_of(data, z_mm)
         focus = removal.segment(data.counts, planes, z_range_mm=z_range_mm, method=method)
-        results.save_segmented(folder, focus)
+        results.save_result(folder, focus)
         for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
             write_png(folder / f"in_focus_{focus.method}_{z:g}mm.png", mask_image(mask))
     shares = zip(focus.z_mm, focus.in_focus.mean(axis=(1, 2)), strict=True)

@@ -183,10 +183,8 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
 
     labels = _labels(rows)
     records = [
-        {
-            "scene": labels[row["title"], row["recipe"]],
-            "light": "by exposure" if row["budget"] is None else row["budget"],
-        }
+        {"scene": labels[row["title"], row["recipe"]]}
+        | {"light": "by exposure" if row["budget"] is None else row["budget"]}
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
@@ -224,7 +222,7 @@ def _of_planes(row: Row) -> Iterable[Row]:
         if plane["truth"] == "object":
             record |= {"objects": plane["object"]} | scores
         else:
-            record |= {f"pixel_{name}": scores[name] for name in scores}
+            record |= {f"pixel_{name}": score for name, score in scores.items()}
     return records.values()
 
 
