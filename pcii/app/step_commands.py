@@ -9,7 +9,7 @@ import numpy as np
 from cyclopts import CoercionError, Parameter, Token
 
 from pcii.app import results
-from pcii.app.pipeline import full_light_sections, surface_depths
+from pcii.app.pipeline import surface_depths
 from pcii.app.report import result_tables
 from pcii.base import (
     Executor,
@@ -286,7 +286,8 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     planes = planes_of(data) if has_depths(data) else None
     planes = focus[0].sections.planes if focus else planes
     with results.writing(out, data) as folder:
-        full_light = full_light_sections(data, planes) if data.truth and planes else None
+        views = data.views if data.truth and planes else None
+        full_light = reconstruct_sections(views, planes) if views and planes else None
         options = {"grid": data.grid, "full_light": full_light, "dataset": data.name}
         result = scoring.score(focus, depth_map, data.truth, **options)
         write_json_safely(folder / results.SCORE, result.to_dict())

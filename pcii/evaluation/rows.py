@@ -11,7 +11,7 @@ blur, `within_1px` and the other scores of depth, with dots for what is nested, 
 
 import json
 import os
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -159,13 +159,13 @@ def origin_of(rows: Sequence[Row]) -> dict[str, Any]:
 
     `differing` names what has several versions or sources.
     """
-    software: dict[str, Counter[str]] = defaultdict(Counter)
-    for row in rows:
-        for name, number in (row.get("software") or {}).items():
-            software[name][number] += 1
+    import pandas as pd
+
+    columns = pd.DataFrame([row.get("software") or {} for row in rows]).items()
+    software = {str(name): column.value_counts(sort=False).to_dict() for name, column in columns}
     days = sorted(row["date"] for row in rows if "date" in row)
     return {
-        "software": {name: dict(numbers) for name, numbers in software.items()},
+        "software": software,
         "differing": sorted(name for name, numbers in software.items() if len(numbers) > 1),
         "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
         "days": [days[0], days[-1]] if days else [],
@@ -190,7 +190,7 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
         | measured
         for row in rows
-        for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
+        for measured in _measured(row)
     ]
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
@@ -209,12 +209,10 @@ def _encodable(text: str) -> str:
     return text.encode(errors="backslashreplace").decode()
 
 
-def _of_depth(row: Row) -> Row:
-    return dict(leaves(row["depth"])) | ({"bound_px": row["bound_px"]} if "bound_px" in row else {})
-
-
-def _of_planes(row: Row) -> Iterable[Row]:
-    """A record for each plane, with its scores against both kinds of truth."""
+def _measured(row: Row) -> Iterable[Row]:
+    """A record of depth, or one for each plane, with its scores against both kinds of truth."""
+    if "depth" in row:
+        return [dict(leaves(row["depth"])) | {name: row[name] for name in ("bound_px",) if name in row}]
     records: dict[float, Row] = {}
     for plane in row.get("planes", ()):
         record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
