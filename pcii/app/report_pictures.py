@@ -124,24 +124,19 @@ def report_panels(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _slider_planes(outcome: Outcome) -> FocalPlanes:
-    """Planes through the depth range and those of the analysis, evenly spaced in total disparity."""
-    grid, z_mm = outcome.dataset.grid, outcome.sections.z_mm
-    near, far = min(outcome.z_range_mm[0], z_mm.min()), max(outcome.z_range_mm[1], z_mm.max())
-    span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
-    if span_px == 0:  # one camera has one section for all depths
-        return FocalPlanes.at_depths(grid, z_mm[:1])
-    step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
-    planes = FocalPlanes.between(grid, near, far, step_px)
-    return planes.take(slice(None, None, -1))  # from near to far
-
-
 def _slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
     """Sections through the depth range, all at one exposure, and which is at the first plane of the analysis.
 
-    Captions are depths.
+    They are evenly spaced in total disparity, and their captions are depths.
     """
-    outcome, planes = pictures.outcome, _slider_planes(pictures.outcome)
+    outcome, grid = pictures.outcome, pictures.outcome.dataset.grid
+    z_mm, (near, far) = outcome.sections.z_mm, outcome.z_range_mm
+    near, far = min(near, z_mm.min()), max(far, z_mm.max())
+    span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
+    planes = FocalPlanes.at_depths(grid, z_mm[:1])  # one camera has one section for all depths
+    if span_px > 0:
+        step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
+        planes = FocalPlanes.between(grid, near, far, step_px).take(slice(None, None, -1))
     stacks = (
         reconstruct(outcome.dataset.counts_or_views, planes.take(slice(first, first + SECTIONS_AT_ONCE)))
         for first in range(0, len(planes), SECTIONS_AT_ONCE)
@@ -182,22 +177,19 @@ def _plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel
         lights["full light (Eq. 2)"] = pictures.of_sections([outcome.full_light], 0.0)
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
-        sections = [
-            _panel(photo_uri(light[plane]), f"section at {z:g} mm, {words}")
-            for words, light in lights.items()
-        ]
+        at = f"{z:g} mm"
+        sections = [_panel(photo_uri(light[plane]), f"section at {at}, {of}") for of, light in lights.items()]
         if true is not None:
-            sections.append(
-                _panel(drawing_uri(mask_image(middles(true[plane]))), f"truth: {what} at {z:g} mm")
-            )
+            image = mask_image(middles(true[plane]))
+            sections.append(_panel(drawing_uri(image), f"truth: {what} at {at}"))
         masks: list[Panel] = []
         for focus in outcome.focus:
             claim = middles(focus.in_focus[plane])
-            masks.append(_panel(photo_uri(images[plane] * claim[..., None]), f"{focus.method}, {z:g} mm"))
+            masks.append(_panel(photo_uri(images[plane] * claim[..., None]), f"{focus.method}, {at}"))
             if true is not None:
                 image = agreement_image(claim, middles(true[plane]))
-                masks.append(_panel(drawing_uri(image), f"{focus.method}, {z:g} mm, compared with the truth"))
-        planes.append((f"{z:g} mm", sections, masks))
+                masks.append(_panel(drawing_uri(image), f"{focus.method}, {at}, compared with the truth"))
+        planes.append((at, sections, masks))
     return planes
 
 

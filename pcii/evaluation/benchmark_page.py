@@ -20,7 +20,7 @@ from pcii.evaluation.evaluation_page import accuracy_plot, light_name, mean_tabl
 from pcii.evaluation.method_names import estimator_of, known_methods
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.figures import NOT_KNOWN, render_page, text_table
-from pcii.store import IN_FRAMES, ROWS, verify
+from pcii.store import IN_FRAMES, verify
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -38,7 +38,7 @@ def write_page(folder: Path, out: Path) -> int:
     """Write the page of all submissions in a folder, each a folder in it; returns how many there are.
 
     Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
-    one name, a name that could be taken for another one, and submissions of several benchmarks.
+    one name, and submissions of several benchmarks.
     """
     submissions: dict[Path, ScoredSubmission] = {}
     for file in sorted(folder.glob(f"*/{SUBMISSION}")):
@@ -58,12 +58,7 @@ def write_page(folder: Path, out: Path) -> int:
             if other != inside:
                 names = f"{other.name} and {inside.name}"
                 raise InputError(f"{folder}: {names} are both of {about.method!r}, in upper or lower case")
-        new_rows = by_scene(read_rows(inside))
-        if unnamed := {row["method"] for row in new_rows}.difference(about.methods):
-            raise InputError(
-                f"{inside / ROWS}: has rows of {min(unnamed)!r}, which {SUBMISSION} does not name"
-            )
-        rows += new_rows
+        rows += by_scene(read_rows(inside))
     frame = summary.with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]

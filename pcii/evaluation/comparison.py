@@ -346,9 +346,7 @@ class EvaluationJob:
             depth = dict(score(None, estimate, truth, grid=data.grid).depth)
             return row | {"depth": depth} | self._bound(task, data, images)
         result = score(estimate, None, truth)
-        planes = [
-            {name: value for name, value in plane.items() if name != "method"} for plane in result.planes
-        ]
+        planes = [{name: plane[name] for name in plane if name != "method"} for plane in result.planes]
         return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 
     def estimate(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:

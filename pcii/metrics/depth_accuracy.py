@@ -27,7 +27,7 @@ from pcii.types import (
 )
 
 MEASURES = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px", "bias_mm")
-MEASURES += ("bias_px", "within_1px", "within_3px", "brier", "quadratic_score", "ece", "reliability")
+MEASURES += ("bias_px", "within_1px", "within_3px", "brier", "quadratic_score")
 ONE_DEPTH_MEASURES = ("within_1px", "within_3px", "quadratic_score")
 HCI_BORDER_PX = 15
 """Border that the benchmark ignores."""
@@ -62,6 +62,7 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     errors: dict[str, Any] = dict.fromkeys(MEASURES)
     errors["one_depth"] = dict.fromkeys(ONE_DEPTH_MEASURES)
     errors["hci"], errors["hci_objects"] = dict.fromkeys(HCI_MEASURES), dict.fromkeys(HCI_MEASURES)
+    errors["ece"] = errors["reliability"] = None
     if grid is None or depth is None or truth is None:
         return errors
     on_object = np.isfinite(truth.object_z_mm)
@@ -140,14 +141,6 @@ def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, An
     `ece`, the expected calibration error (Naeini, Cooper and Hauskrecht 2015), is the mean of
     |correct - confidence| over the bins, weighted by their shares. Both are None without any estimate. Raises
     `InputError` for a confidence that is no probability.
-
-    >>> grid = CameraGrid(
-    ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=1, width=4
-    ... )
-    >>> true = Truth(np.full((1, 4), 500.0), np.ones((1, 4), dtype=int), {1: "wall"})
-    >>> depth = DepthMap(np.array([[500.0, 500.0, 500.0, 900.0]]), np.full((1, 4), 0.75))
-    >>> calibration(grid, depth, true)["ece"]
-    0.0
     """
     answered = _answered(depth.z_mm) & ~truth.is_unscored
     if not answered.any():
@@ -193,13 +186,6 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     The Cramer-Rao bound 1 / sqrt(N (c_x <g_x^2> + c_y <g_y^2>)) for a surface at one depth with a known
     texture of which all views together have N = `photons`; `gradient_squared` is (<g_x^2>, <g_y^2>), means
     over the photons. None without information on depth: no photons, no texture or a single camera.
-
-    >>> from pcii.types.camera_grid import CameraGrid
-    >>> grid = CameraGrid(
-    ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=9, width=9
-    ... )
-    >>> depth_bound_px(grid, photons=5000, gradient_squared=(0.01, 0.01)).__round__(3)
-    0.313
     """
     if total_disparity_px(grid, 1.0) == 0:
         return None

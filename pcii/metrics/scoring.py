@@ -46,20 +46,6 @@ def score(
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.
-
-    >>> import pcii
-    >>> grid = pcii.CameraGrid(
-    ...     rows=2, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.25, height=8, width=12
-    ... )
-    >>> counts = pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    >>> z_mm, object_id = np.full((8, 12), np.inf), np.zeros((8, 12), dtype=int)
-    >>> z_mm[2:6, 2:6], object_id[2:6, 2:6] = 500.0, 1
-    >>> in_focus = np.zeros((1, 8, 12), dtype=bool)
-    >>> in_focus[0, 2:6, 2:10] = True
-    >>> focus = pcii.Segmented(in_focus, "by hand", pcii.reconstruct(counts, z_mm=500))
-    >>> row = score(focus, None, pcii.Truth(z_mm, object_id, {1: "card"})).planes[0]
-    >>> row["object"], row["iou"], row["precision"], row["recall"]
-    ('card', 0.5, 0.5, 1.0)
     """
     methods = [focus] if isinstance(focus, Segmented) else list(focus or ())
     if methods:
