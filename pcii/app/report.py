@@ -182,38 +182,13 @@ def _score_table(outcome: Outcome) -> "DataFrame":
     return text_table(cells, header, words=len(words))
 
 
-def result_tables(outcome: Outcome) -> Iterator[str]:
-    """Lines for a terminal: IoU by method and plane, then how right depth is, as far as the truth tells."""
-    import pandas as pd
-
-    truth = outcome.dataset.truth
-    kind = "object" if truth is None else truth.mask_kind
-    rows = [row for row in outcome.score.planes if row["truth"] == kind and row["iou"] is not None]
-    if rows:
-        other = "nothing" if kind == "object" else "all in focus"
-        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or other}" for row in rows}
-        iou = pd.DataFrame(rows).pivot(index="method", columns="z_mm", values="iou")
-        iou = iou.rename(columns=columns).rename_axis(index=None, columns=None)
-        yield f"IoU of the masks\n{iou.to_string(float_format='{:.3f}'.format, na_rep=NOT_KNOWN)}"
-    depth = outcome.score.depth
-    if depth["within_1px"] is not None:
-        names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
-        shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
-        yield f"Depth, shares of {_pixels_of_depth(truth)}\n{shares.to_string(float_format='{:.3f}'.format)}"
-
-
-def _pixels_of_depth(truth: Truth | None) -> str:
-    """Of which pixels the errors of depth are."""
-    has_objects = truth is not None and truth.has_objects
-    return "the objects' pixels" if has_objects else "all pixels with a true depth"
-
-
 def _depth_table(outcome: Outcome) -> "DataFrame":
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
     rows: list[tuple[str, str]] = []
-    if depth["coverage"] is not None:
-        rows.append((f"share with an estimate, of {_pixels_of_depth(truth)}", f"{depth['coverage']:.1%}"))
+    if truth is not None and depth["coverage"] is not None:
+        pixels = "the objects' pixels" if truth.has_objects else "all pixels with a true depth"
+        rows.append((f"share with an estimate, of {pixels}", f"{depth['coverage']:.1%}"))
         for limit in (1, 3):
             name = f"within {limit} px of total disparity (by the best answer of one depth everywhere)"
             of_one_depth = depth["one_depth"][f"within_{limit}px"]

@@ -1,7 +1,7 @@
 """Commands that analyse one dataset: all steps, sections, depth, removal, score; and options of commands."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,8 +9,7 @@ import numpy as np
 from cyclopts import CoercionError, Parameter, Token
 
 from pcii.app import results
-from pcii.app.pipeline import surface_depths
-from pcii.app.report import result_tables
+from pcii.app.pipeline import Outcome, surface_depths
 from pcii.base import (
     Executor,
     InputError,
@@ -22,7 +21,7 @@ from pcii.base import (
     write_json_safely,
 )
 from pcii.depth import DEFAULT_METHOD, estimate_depth
-from pcii.figures import draw_depth, exposed, figure_bytes, mask_image, new_figure, write_png
+from pcii.figures import NOT_KNOWN, draw_depth, exposed, figure_bytes, mask_image, new_figure, write_png
 from pcii.metrics import scoring
 from pcii.removal import methods as removal
 from pcii.sections import reconstruct as reconstruct_sections
@@ -149,7 +148,7 @@ def run(
     z_range_mm = z_range_mm or depth_range_of(data, z_mm)
     with Stages() as report:
         outcome = results.run(data, out, planes, z_range_mm, method, depth_method, report)
-    for lines in result_tables(outcome):
+    for lines in _result_tables(outcome):
         say(f"\n{lines}\n")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
@@ -305,6 +304,27 @@ def _opened(folder: Path, budget: float | str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     dataset = open_dataset(folder)
     return dataset if budget is None else dataset.at_light(Light.parse(budget))
+
+
+def _result_tables(outcome: Outcome) -> Iterator[str]:
+    """Lines for a terminal: IoU by method and plane, then how right depth is, as far as the truth tells."""
+    import pandas as pd
+
+    truth = outcome.dataset.truth
+    kind = "object" if truth is None else truth.mask_kind
+    rows = [row for row in outcome.score.planes if row["truth"] == kind and row["iou"] is not None]
+    if rows:
+        other = "nothing" if kind == "object" else "all in focus"
+        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or other}" for row in rows}
+        iou = pd.DataFrame(rows).pivot(index="method", columns="z_mm", values="iou")
+        iou = iou.rename(columns=columns).rename_axis(index=None, columns=None)
+        yield f"IoU of the masks\n{iou.to_string(float_format='{:.3f}'.format, na_rep=NOT_KNOWN)}"
+    depth = outcome.score.depth
+    if truth is not None and depth["within_1px"] is not None:
+        pixels = "the objects' pixels" if truth.has_objects else "all pixels with a true depth"
+        names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
+        shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
+        yield f"Depth, shares of {pixels}\n{shares.to_string(float_format='{:.3f}'.format)}"
 
 
 def _say_hot_pixels(estimate: Segmented | DepthMap) -> None:

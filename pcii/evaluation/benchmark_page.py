@@ -16,7 +16,7 @@ from pcii.evaluation.benchmark_scores import (
     by_scene,
     read_submission,
 )
-from pcii.evaluation.evaluation_page import accuracy_plot, light_name, mean_table, rank_table
+from pcii.evaluation.evaluation_page import accuracy_plot
 from pcii.evaluation.method_names import estimator_of, known_methods
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.figures import NOT_KNOWN, render_page, text_table
@@ -75,7 +75,7 @@ def write_page(folder: Path, out: Path) -> int:
             if measure in {*cell_means["measure"]}
         },
         "ranks": {
-            f"{title} over all {unit}": rank_table(summary.ranks(of_scenes, measure), unit)
+            f"{title} over all {unit}": summary.rank_table(summary.ranks(of_scenes, measure), unit)
             for measure, title in summary.DECISIVE.items()
             for unit in [summary.ranked_over(of_scenes, measure)]
         },
@@ -100,17 +100,21 @@ def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:
     accuracy = over_scenes[over_scenes["measure"] == measure]
     is_time = (over_scenes["measure"] == "seconds") & (over_scenes["light"] == TYPICAL_PHOTONS)
     times = over_scenes[is_time].assign(column=f"seconds at {TYPICAL_PHOTONS:g}")
-    by_light = pd.concat([accuracy.assign(column=accuracy["light"].map(light_name).astype(object)), times])
-    columns = [*map(light_name, accuracy["light"].unique()), *times["column"].unique()]
+    by_light = pd.concat(
+        [accuracy.assign(column=accuracy["light"].map(summary.light_name).astype(object)), times]
+    )
+    columns = [*map(summary.light_name, accuracy["light"].unique()), *times["column"].unique()]
     by_light["column"] = pd.Categorical(by_light["column"], columns)
     at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
     tables: dict[str, DataFrame] = {}
     if len(by_light):
         full_n = of_scenes["scene"].nunique()
-        tables["By photons per view"] = mean_table(by_light, ["method"], "column", full_n=full_n, bound=BOUND)
+        tables["By photons per view"] = summary.mean_table(
+            by_light, ["method"], "column", full_n=full_n, bound=BOUND
+        )
     if len(at_typical):
         title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
-        tables[title] = mean_table(at_typical, ["scene"], "method", bound=BOUND)
+        tables[title] = summary.mean_table(at_typical, ["scene"], "method", bound=BOUND)
     chart = accuracy_plot(over_scenes, list(values["method"].cat.categories), measure)
     return {"chart": chart, "tables": tables}
 

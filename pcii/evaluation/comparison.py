@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent
 from pcii.depth import check_range_mm, estimate_depth
 from pcii.evaluation import summary
-from pcii.evaluation.evaluation_page import accuracies, write_evaluation
+from pcii.evaluation.evaluation_page import write_evaluation
 from pcii.evaluation.method_names import (
     Method,
     NamedMethod,
@@ -100,7 +100,7 @@ class Evaluation:
         """
         if measure not in summary.AXES:
             raise InputError(f"measure: expected one of {', '.join(summary.AXES)}, got {measure!r}")
-        cells = accuracies(summary.over_scenes(self.means()), measure)
+        cells = summary.accuracies(summary.over_scenes(self.means()), measure)
         methods, is_share = sorted(cells["method"].unique()), summary.kind_of(measure) != "positive"
         with in_style(style):
             panels = draw_accuracy(axes, cells, methods, summary.AXES[measure], is_share=is_share)
