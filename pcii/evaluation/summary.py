@@ -312,24 +312,15 @@ def accuracies(table: "DataFrame", measure: str) -> "DataFrame":
     return cells.reset_index()
 
 
-def with_interval(mean: float, low: float, high: float, digits: int = 3) -> str:
-    """A mean with its interval as text, a dash for NaN.
-
-    >>> with_interval(0.912, 0.905, 0.919), with_interval(0.912, float("nan"), float("nan"))
-    ('0.912 (0.905 to 0.919)', '0.912')
-    """
+def _with_interval(mean: float, low: float, high: float) -> str:
+    """A mean with its interval, if it has one, as text; a dash for NaN."""
     if np.isnan(mean):
         return NOT_KNOWN
-    text = f"{mean:.{digits}f}"
-    return text if np.isnan(low) else f"{text} ({low:.{digits}f} to {high:.{digits}f})"
+    return f"{mean:.3f}" if np.isnan(low) else f"{mean:.3f} ({low:.3f} to {high:.3f})"
 
 
 def light_name(light: float | str) -> str:
-    """A light of the frame as the name of a column or plot.
-
-    >>> light_name(300.0), light_name("full-light"), light_name("by exposure")
-    ('300', 'full light', 'by exposure')
-    """
+    """A light of the frame as the name of a column or plot: "300", "full light"."""
     return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
 
 
@@ -362,7 +353,7 @@ def mean_table(
     texts: list[str] = []
     for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
         number = f" of {row.n}" if row.n < full_n else ""
-        text = with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
+        text = _with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
         texts.append(emphasised(text) if row.is_best else text)
     cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
     table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
@@ -379,8 +370,8 @@ def rank_table(table: "DataFrame", unit: str) -> "DataFrame":
             row.method,
             light_name(row.light),
             str(row.rank),
-            with_interval(row.mean, row.low, row.high),
-            with_interval(row.difference, row.difference_low, row.difference_high),
+            _with_interval(row.mean, row.low, row.high),
+            _with_interval(row.difference, row.difference_low, row.difference_high),
             *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
             str(row.n),
         )

@@ -59,18 +59,15 @@ def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any)
     with in_style(style):
         panels = DRAWINGS[type(value).__name__](value, axes, **options)
         if style == "paper":
-            for panel, mm_per_px in zip(panels, _pixel_sizes_mm(value, len(panels)), strict=True):
+            sections = getattr(value, "sections", value)
+            sizes_mm: Sequence[float | None] = [None] * len(panels)
+            if hasattr(sections, "planes"):
+                z_mm, grid = sections.z_mm, sections.grid
+                planes = evenly_chosen(len(z_mm), len(panels))
+                sizes_mm = [float(z_mm[plane]) * grid.pixel_mm / grid.focal_mm for plane in planes]
+            for panel, mm_per_px in zip(panels, sizes_mm, strict=True):
                 _draw_scale_bar(panel, mm_per_px)
     return panels
-
-
-def _pixel_sizes_mm(value: Any, count: int) -> list[float] | list[None]:
-    """How wide a pixel is at the depth of each of the sections that are drawn; None for other pictures."""
-    sections = getattr(value, "sections", value)
-    if not hasattr(sections, "planes"):
-        return [None] * count
-    z_mm, grid = sections.z_mm, sections.grid
-    return [float(z_mm[plane]) * grid.pixel_mm / grid.focal_mm for plane in evenly_chosen(len(z_mm), count)]
 
 
 def picture_html(value: Any) -> str:
