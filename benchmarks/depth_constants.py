@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 import pcii
+from benchmarks.page import table_markdown
 from pcii.base import Stages
 from pcii.depth import PosteriorDepth, depth_map_of
 from pcii.evaluation import NamedMethod, find_datasets, tasks_of
 from pcii.evaluation.summary import light_name
-from pcii.figures import table_markdown, text_table
+from pcii.figures import text_table
 from pcii.removal import masks_of
 from pcii.store import depth_range_of, planes_of
 from pcii.types import Light

@@ -3,7 +3,7 @@ from .charts import colour_bar_uri as colour_bar_uri, draw_accuracy as draw_accu
 from .charts import figure_bytes as figure_bytes, figure_uri as figure_uri, hide_frame as hide_frame
 from .charts import in_style as in_style, new_figure as new_figure
 from .pages import NOT_KNOWN as NOT_KNOWN, emphasised as emphasised, render_page as render_page
-from .pages import table_markdown as table_markdown, text_table as text_table
+from .pages import text_table as text_table
 from .pictures import DEPTH_COLOURS as DEPTH_COLOURS, ERROR_COLOURS as ERROR_COLOURS
 from .pictures import SHARE_COLOURS as SHARE_COLOURS, agreement_image as agreement_image
 from .pictures import block_px as block_px, depth_image as depth_image, drawing_uri as drawing_uri
