@@ -232,7 +232,14 @@ def tasks_of(
                     f"method: {method.name!r} needs {kinds[0]}, and of {dataset.path} {kinds[1]} would be "
                     f"scored; use {', '.join(methods_for(full_light=takes_counts))}"
                 )
-        _check_depths(dataset, names, z_mm)
+        of_depth = [estimator_of(name) is not None for name in names]
+        if z_mm or not all(of_depth):
+            planes_of(dataset, z_mm)
+        try:
+            if any(of_depth):
+                check_range_mm(dataset.grid, depth_range_of(dataset, z_mm))
+        except InputError as fault:
+            raise InputError(f"{dataset.path}: {fault}") from None
         tasks.setdefault(identity_of(dataset.manifest), tasks_of_dataset)
     return [task for tasks_of_dataset in tasks.values() for task in tasks_of_dataset]
 
@@ -242,18 +249,6 @@ def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[
     has_planes = has_depths(dataset, z_mm)
     names = methods_for(full_light=light == FULL_LIGHT)
     return [NamedMethod(name) for name in names if has_planes or estimator_of(name)]
-
-
-def _check_depths(dataset: Dataset, methods: set[str], z_mm: Sequence[float]) -> None:
-    """Raise `InputError` if methods need depths and none are named, or if they cannot be searched."""
-    of_depth = [estimator_of(name) is not None for name in methods]
-    if z_mm or not all(of_depth):
-        planes_of(dataset, z_mm)
-    if any(of_depth):
-        try:
-            check_range_mm(dataset.grid, depth_range_of(dataset, z_mm))
-        except InputError as fault:
-            raise InputError(f"{dataset.path}: {fault}") from None
 
 
 def identity_of(manifest: "DatasetManifest") -> str:

@@ -240,7 +240,7 @@ def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
             for recipe, texts in by_recipe.items()
         }
         for recipe, words in parts.items():
-            if len(parts) > 1 and list(parts.values()).count(words) > 1:
+            if list(parts.values()).count(words) > 1:
                 # A scene that was changed, or has no recipe, differs in no setting.
                 words = [*words, f"recipe {recipe[:8]}"]
             labels[title, recipe] = f"{title} ({', '.join(words)})" if words else title

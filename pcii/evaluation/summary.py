@@ -70,6 +70,7 @@ MEASURES = (
 )
 """In the order of their columns."""
 AXES = {measure.name: measure.axis for measure in MEASURES if measure.axis}
+"""Labels of the measures that are drawn."""
 MORE_IS_BETTER = [measure.name for measure in MEASURES if measure.more_is_better]
 DECISIVE = {"iou": "IoU", "within_1px": "Share of depths within 1 px"}
 """What methods of removal and of depth are compared by above all, and its title."""
