@@ -198,7 +198,10 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
             sections[planes] = reconstruct(dataset.counts, arrays["z_mm"])
         method, photons = part.removeprefix("segmented_").removesuffix(".zarr"), arrays.get("photon_in_focus")
         segmented.append(Segmented(arrays["in_focus"], method, sections[planes], photon_in_focus=photons))
-    depth = DepthMap(**read(DEPTH, DEPTH_LABELS)) if lists_part(files, DEPTH) else None
+    depth = None
+    if lists_part(files, DEPTH):
+        maps = read(DEPTH, DEPTH_LABELS)
+        depth = DepthMap(maps["z_mm"], maps["confidence"])
     if not segmented and depth is None:
         raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with `pcii run`")
     return segmented, depth
