@@ -43,7 +43,7 @@ def main() -> int:
         scores: dict[tuple[str, str], list[tuple[float, ...]]] = {}
         with Stages() as report:
             for number, task in enumerate(tasks):
-                data = task.data
+                data = task.dataset.at_light(task.light)
                 for done, (name, method) in enumerate(methods.items(), start=1):
                     scores.setdefault((name, str(task.light)), []).append(_scores(data, method))
                     report("constants", number * len(methods) + done, len(tasks) * len(methods))
