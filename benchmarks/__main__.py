@@ -10,12 +10,11 @@ from pathlib import Path
 from benchmarks import paper_scene
 from benchmarks.guard import REFERENCE, losses, reference_of
 from benchmarks.machine import commit, in_words, machine, versions, was_busy
-from benchmarks.page import tables_of, write_page
+from benchmarks.page import table_markdown, tables_of, write_page
 from benchmarks.quoted import add, add_benchmark, add_study, read_figures, write_figures
 from benchmarks.results import Record, Size, Study, read_record, write_record
 from benchmarks.studies import STUDIES
 from pcii.base import InputError, write_json_safely
-from pcii.figures import table_markdown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 

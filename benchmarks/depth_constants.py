@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 import pcii
+from benchmarks.page import table_markdown
 from pcii.base import Stages
 from pcii.depth import PosteriorDepth, depth_map_of
 from pcii.evaluation import NamedMethod, find_datasets, tasks_of
-from pcii.evaluation.tables import light_name
-from pcii.figures import table_markdown, text_table
+from pcii.evaluation.summary import light_name
+from pcii.figures import text_table
 from pcii.removal import masks_of
 from pcii.sections import depth_range_of, planes_of
 from pcii.types import Light
@@ -42,7 +43,7 @@ def main() -> int:
         scores: dict[tuple[str, str], list[tuple[float, ...]]] = {}
         with Stages() as report:
             for number, task in enumerate(tasks):
-                data = task.data
+                data = task.dataset.at_light(task.light)
                 for done, (name, method) in enumerate(methods.items(), start=1):
                     scores.setdefault((name, str(task.light)), []).append(_scores(data, method))
                     report("constants", number * len(methods) + done, len(tasks) * len(methods))

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import Measured, Parameter, Row, Study, Value, label
-from pcii.figures.charts import quiet_grid
-from pcii.figures.panels import COLOURS, MARKERS
+from pcii.figures.charts import COLOURS, MARKERS, quiet_grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

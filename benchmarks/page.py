@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.figures import draw
 from benchmarks.machine import in_words, was_busy
 from benchmarks.results import Record, Row, Study, Value, label
-from pcii.base import write_bytes_safely
-from pcii.figures import table_markdown, text_table
+from pcii.base import in_markdown, write_bytes_safely
+from pcii.figures import text_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -98,3 +98,17 @@ def _parameter(value: Any) -> str:
     if value is None:
         return "–"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def table_markdown(table: "DataFrame") -> str:
+    """A table in Markdown, all texts escaped.
+
+    >>> print(table_markdown(text_table([("a|b", "1")], ("what", "value"))))
+    | what | value |
+    | :-- | --: |
+    | a\\|b | 1 |
+    """
+    columns = table.reset_index()
+    header, *rows = (map(in_markdown, row) for row in [[*columns.columns], *columns.to_numpy().tolist()])
+    rule = [":--"] * table.index.nlevels + ["--:"] * len(table.columns)
+    return "\n".join(f"| {' | '.join(row)} |" for row in (header, rule, *rows))

@@ -16,8 +16,7 @@ from matplotlib import pyplot as plt
 from pcii.evaluation import SUBMISSION, frame_of, means, read_rows
 from pcii.evaluation.benchmark_scores import by_scene
 from pcii.evaluation.summary import with_yardsticks
-from pcii.figures.charts import quiet_grid
-from pcii.figures.panels import COLOURS, MARKERS
+from pcii.figures.charts import COLOURS, MARKERS, quiet_grid
 from pcii.store import IN_FRAMES
 from simgen.dataset import load_definition
 

@@ -13,7 +13,7 @@ import pytest
 from hostile_names import NAMES
 
 from pcii.app import commands as pcii_cli
-from pcii.app.command_options import depths_mm
+from pcii.app.step_commands import depths_mm
 from pcii.base import Stages, answer_json, command_line, say, say_next, visible
 from pcii.store import MARKER, SAMPLE
 from simgen.app import commands as simgen_cli

@@ -14,8 +14,7 @@ from benchmarks.scenes import film
 from pcii.base import Stages
 from pcii.evaluation import depth_name, evaluate, means
 from pcii.evaluation.method_names import estimator_of, methods_for
-from pcii.evaluation.summary import lines_of
-from pcii.evaluation.tables import SWEEPS
+from pcii.evaluation.summary import SWEEPS, lines_of
 from simgen.dataset import generate_collection
 from simgen.spec import load_sweep
 

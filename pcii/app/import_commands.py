@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from pcii.app.command_options import Depths, Out
 from pcii.app.pipeline import depths_text, surface_depths
+from pcii.app.step_commands import Depths, Out
 from pcii.base import InputError, Stages, results_folder, say, say_next
 from pcii.evidence import CameraFit, check_grid, without_hot_pixels
 from pcii.exchange import (

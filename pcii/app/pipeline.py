@@ -87,9 +87,12 @@ def analyse(
         seconds[step] = round(time.perf_counter() - start, 3)
         return result
 
+    def at_full_light() -> Sections | None:
+        return None if dataset.views is None else reconstruct(dataset.views, planes)
+
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
     with ThreadPoolExecutor(2) as pool:
-        light = pool.submit(timed, "sections at full light", lambda: full_light_sections(dataset, planes))
+        light = pool.submit(timed, "sections at full light", at_full_light)
         sections = None if counts is None else timed("sections", partial(reconstruct, counts, planes))
         estimate = partial(_depth_of, data, z_range_mm, planes, depth_method)
         depth = pool.submit(timed, "depth", estimate)
@@ -143,8 +146,3 @@ def depths_text(z_mm: Sequence[float]) -> str:
     '1870, 45'
     """
     return ", ".join(f"{float(f'{z:.3g}'):g}" for z in z_mm)
-
-
-def full_light_sections(dataset: Dataset, planes: FocalPlanes) -> Sections | None:
-    """Sections of the radiance at the planes (Eq. 2); None if the dataset has none."""
-    return None if dataset.views is None else reconstruct(dataset.views, planes)

@@ -1,12 +1,13 @@
 """report.html: a slider through the depths, pictures of each plane, depth, scores, and how it was made.
 
 A single file that fetches nothing, which can be mailed, archived and printed. Its pictures and text need no
-script; the slider is by the one in `pcii/figures/templates/report.js`. In tables a column or row of which
-nothing is known is left out.
+script; the slider is by the one in `pcii/figures/templates/report.js`. All pictures show the same part of the
+frame, in blocks if it is large. In tables a column or row of which nothing is known is left out.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,49 +15,122 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels, slider_panels
-from pcii.base import write_bytes_safely
+from pcii.base import box_around, each_in_threads, write_bytes_safely
 from pcii.evaluation import NamedMethod, depth_name, mean_interval, software_of
-from pcii.figures import NOT_KNOWN, emphasised, render_page, text_table
-from pcii.metrics import entropy_region
+from pcii.figures import (
+    DEPTH_COLOURS,
+    ERROR_COLOURS,
+    NOT_KNOWN,
+    SHARE_COLOURS,
+    agreement_image,
+    block_px,
+    colour_bar_uri,
+    drawing_uri,
+    emphasised,
+    exposed,
+    map_image,
+    mask_image,
+    photo_uri,
+    photon_picture,
+    render_page,
+    smoothing_for,
+    text_table,
+)
+from pcii.metrics import TrueFocus, entropy_region
 from pcii.sections import pooled_estimate, pooled_samples, reconstruct, region_entropy_bits, section_window_px
 from pcii.store import machine
-from pcii.types import PhotonCounts, Sections, Truth
+from pcii.types import FocalPlanes, PhotonCounts, Sections, Truth, colours_and_samples, total_disparity_px
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 COARSE_PX = 320
 """Smaller pictures are enlarged with sharp pixels."""
-NUMBERS = {
-    "iou": "IoU",
-    "everything": "IoU of all claimed",
-    "precision": "precision",
-    "recall": "recall",
-    "f1": "F1",
-    "boundary_f": "boundary F",
-    "photon_precision": "photon precision",
-    "photon_recall": "photon recall",
-    "entropy_before": "entropy before",
-    "entropy_after": "entropy after",
-    "claimed_share": "claimed share",
-    "false_share": "claimed falsely",
-}
+LONGEST_PX = 640
+"""Longer sides of pictures are shown in blocks of 2 x 2 pixels, or of more."""
+MAX_SLIDER_PLANES = 20
+"""Pictures of the slider: a report of 1024 x 1024 pixels is then below 8 MB."""
+MIN_SLIDER_STEP_PX = 1.0
+"""Sections whose total disparities differ by less look the same."""
+SECTIONS_AT_ONCE = 4
+"""Sections of the slider in memory at once; each such group reads all views."""
+UNSATURATED_SHARE = 0.95
+"""Share of the errors of depth that lie within the scale of their colours."""
+NUMBERS = ("iou", "everything", "precision", "recall", "f1", "boundary_f", "photon_precision")
+NUMBERS += ("photon_recall", "entropy_before", "entropy_after", "claimed_share", "false_share")
 """Columns of the scores after those that say what is scored."""
+NAMES = {"iou": "IoU", "everything": "IoU of all claimed", "f1": "F1", "boundary_f": "boundary F"}
+NAMES |= {"false_share": "claimed falsely"}
+"""Names of columns, where they are not those of the scores."""
 JACKKNIFE_GROUPS = 10
 """Intervals of so few pseudo-values are 15 % longer than those of many, and take a fraction of the time."""
 MAX_JACKKNIFE_EVENTS = 5_000_000
 """With more pixels that have photons, intervals are narrower than the digits that are shown."""
 
+Panel = dict[str, str]
+"""An `image` as a data URI and its `caption`; of maps also the colour `bar`."""
+Scale = tuple[str, tuple[float, float], str]
+"""Colour map, limits and label of a map."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """The results that a report shows, rows and columns of the frame, the side of its blocks, and smoothing.
+
+    `smoothing_px` is the standard deviation in pixels of the Gaussian, 0 for none.
+    """
+
+    outcome: Outcome
+    box: tuple[slice, slice]
+    step_px: int
+    smoothing_px: float
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> "Pictures":
+        """The part around objects or claims, else all; a Gaussian by the number of photons."""
+        truth, smoothing_px = outcome.dataset.truth, 0.0
+        region = np.zeros(outcome.dataset.grid.shape_HW, dtype=bool)
+        if truth is not None and truth.has_objects:
+            region = truth.object_id > 0
+        elif outcome.focus:
+            region = np.any([focus.in_focus.any(axis=0) for focus in outcome.focus], axis=0)
+        box = box_around(region)
+        if outcome.dataset.has_counts:
+            smoothing_px = smoothing_for([counts[box] for counts in outcome.sections.counts])
+        return cls(outcome, box, block_px([side.stop - side.start for side in box], LONGEST_PX), smoothing_px)
+
+    @property
+    def light(self) -> str:
+        """What sections show, in words."""
+        if not self.outcome.dataset.has_counts:
+            return "full light (Eq. 2)"
+        smoothing = f", smoothed by {self.smoothing_px:g} px" if self.smoothing_px else ""
+        return f"photon counts (Eq. 3){smoothing}"
+
+    def middles(self, image: np.ndarray) -> np.ndarray:
+        """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
+        image, half = image[self.box], self.step_px // 2
+        places = (np.arange(half, size + half, self.step_px).clip(max=size - 1) for size in image.shape[:2])
+        return image[np.ix_(*places)]
+
+    def of_sections(self, stacks: Iterable[Sections], smoothing_px: float) -> list[np.ndarray]:
+        """8-bit pictures of all sections of some stacks, at the same exposure."""
+        images = (
+            (counts[self.box], coverage[self.box])
+            for stack in stacks
+            for counts, coverage in zip(stack.counts, stack.coverage, strict=True)
+        )
+        return exposed(images, self.step_px, smoothing_px)
+
 
 def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
     dataset, pictures = outcome.dataset, Pictures.of(outcome)
-    grid, (rows, cols) = dataset.grid, pictures.box
-    slider, first = slider_panels(pictures)
+    rows, cols = pictures.box
+    slider, first = _slider_panels(pictures)
     content = {
         "title": dataset.manifest.get("title") or dataset.name,
-        "grid": grid,
+        "grid": dataset.grid,
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
         "has_truth": dataset.truth is not None,
@@ -67,12 +141,12 @@ def write_report(path: Path, outcome: Outcome) -> None:
         "light": pictures.light,
         "slider": slider,
         "first": first,
-        "input": input_panels(pictures),
-        "planes": plane_panels(pictures),
-        "depth": depth_panels(pictures),
-        "depth_table": depth_table(outcome),
-        "entropies": entropy_table(outcome),
-        "scores": score_table(outcome),
+        "input": _input_panels(pictures),
+        "planes": _plane_panels(pictures),
+        "depth": _depth_panels(pictures),
+        "depth_table": _depth_table(outcome),
+        "entropies": _entropy_table(outcome),
+        "scores": _score_table(outcome),
         "origin": text_table(_origin(outcome), ("what", "value"), words=2),
         "recipe": json.dumps(dataset.manifest.get("recipe"), indent=1, ensure_ascii=False).splitlines(),
     }
@@ -86,12 +160,16 @@ def _origin(outcome: Outcome) -> list[tuple[str, str]]:
     versions: dict[str, str] = {}
     for method in methods:
         versions |= software_of(NamedMethod(method)) or {}
-    seconds = ", ".join(f"{name} {value:.2f} s" for name, value in outcome.timings_s.items())
+    seconds = {name: f"{value:.2f} s" for name, value in outcome.timings_s.items()}
+
+    def listed(words: Mapping[str, str]) -> str:
+        return ", ".join(f"{name} {value}" for name, value in words.items())
+
     rows = [
         ("date", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
         ("machine", machine()),
-        ("time", seconds),
-        ("software", _versions(versions)),
+        ("time", listed(seconds)),
+        ("software", listed(versions)),
         ("methods", ", ".join(methods)),
         ("dataset", outcome.dataset.name),
     ]
@@ -99,17 +177,13 @@ def _origin(outcome: Outcome) -> list[tuple[str, str]]:
         rows.append(("photon budget", str(outcome.dataset.choice)))
     rows += [(key, str(manifest[key])) for key in ("origin", "licence", "citation") if manifest.get(key)]
     if manifest.get("versions"):
-        rows.append(("dataset made by", _versions(manifest["versions"])))
+        rows.append(("dataset made by", listed(manifest["versions"])))
     if manifest.get("identity"):
         rows.append(("identity", manifest["identity"]))
     return rows
 
 
-def _versions(versions: dict[str, str]) -> str:
-    return ", ".join(f"{name} {number}" for name, number in versions.items())
-
-
-def entropy_table(outcome: Outcome) -> "DataFrame":
+def _entropy_table(outcome: Outcome) -> "DataFrame":
     """Entropies of the objects at each plane with their intervals (the paper's Table 1).
 
     The lowest of a row stands out. There are no intervals of too few photons, nor of radiance.
@@ -136,11 +210,9 @@ def _entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth)
 
     A jackknife over photons (Quenouille 1956; Tukey 1958): every photon is in one of G random groups. With H
     the entropy of all photons and H_g that of all but group g, the pseudo-values G H - (G - 1) H_g have about
-    the mean H, and their interval by Student's t is that of H over draws of the photons. A bootstrap would
-    add the noise of its own draws. The variance of a jackknife is rather too large than too small (Efron and
-    Stein 1981): over 16 draws of data_recipes/small.toml entropies vary by 0.5 to 0.85 of the intervals.
-    Objects that are not seen have none; more than `MAX_JACKKNIFE_EVENTS` events, or fewer than G photons,
-    give an empty list. `sections` are those of `counts`.
+    the mean H, and their interval by Student's t is that of H over draws of the photons. Its variance is
+    rather too large than too small (Efron and Stein 1981). Objects that are not seen have none; more than
+    `MAX_JACKKNIFE_EVENTS` events, or fewer than G photons, give an empty list. `sections` are of `counts`.
     """
     if counts.total < JACKKNIFE_GROUPS or counts.events.n.size > MAX_JACKKNIFE_EVENTS:
         return []
@@ -150,29 +222,21 @@ def _entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth)
 
     def entropies(counts_ZHWC: np.ndarray) -> np.ndarray:
         """Entropies (objects, planes) of Eq. 9, as `score` computes them."""
-        pooled = pooled_estimate(
-            Sections(sections.planes, counts_ZHWC, sections.coverage), window_px, samples
-        )
+        stack = Sections(sections.planes, counts_ZHWC, sections.coverage)
+        pooled = pooled_estimate(stack, window_px, samples)
         tops = pooled.max(axis=(0, 1, 2))
-        return np.array(
-            [[region_entropy_bits(plane, region, tops) for plane in pooled] for region in regions]
-        )
+        return np.array([[region_entropy_bits(plane, each, tops) for plane in pooled] for each in regions])
 
-    without_group = [
-        entropies(sections.counts - reconstruct(group, sections.planes).counts)
-        for group in _photon_groups(counts)
-    ]
+    groups = (reconstruct(group, sections.planes).counts for group in _photon_groups(counts))
+    without_group = [entropies(sections.counts - group) for group in groups]
     G, of_all = JACKKNIFE_GROUPS, entropies(sections.counts)
-    pseudo_values = G * of_all - (G - 1) * np.stack(without_group)
-    return [
-        {
-            f"{z:g}": (interval := mean_interval(pseudo_values[:, number, plane].tolist())).high
-            - interval.mean
-            for plane, z in enumerate(sections.z_mm)
-            if region.any()
-        }
-        for number, region in enumerate(regions)
-    ]
+    pseudo_values = G * of_all - (G - 1) * np.stack(without_group)  # (groups, objects, planes)
+    half_widths: list[dict[str, float]] = []
+    for values, region in zip(np.moveaxis(pseudo_values, 0, -1), regions, strict=True):
+        intervals = map(mean_interval, values if region.any() else ())
+        half = (interval.high - interval.mean for interval in intervals)
+        half_widths.append({f"{z:g}": bits for z, bits in zip(sections.z_mm, half, strict=False)})
+    return half_widths
 
 
 def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:
@@ -186,7 +250,7 @@ def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:
         yield PhotonCounts.from_events(*places, grid=counts.grid, cfa=counts.cfa)
 
 
-def score_table(outcome: Outcome) -> "DataFrame":
+def _score_table(outcome: Outcome) -> "DataFrame":
     """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
     rows = [{**row, "everything": row["everything"]["iou"]} for row in outcome.score.planes]
     words = ["plane", "method", "truth", "objects"]
@@ -201,43 +265,17 @@ def score_table(outcome: Outcome) -> "DataFrame":
         objects = "all in focus" if row["truth"] == "pixel" else row["object"] or "none at this plane"
         texts = [f"{row['z_mm']:g} mm", row["method"], row["truth"], objects][: len(words)]
         cells.append((*texts, *(NOT_KNOWN if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
-    header = (*words, *(NUMBERS[key] for key in numbers))
+    header = (*words, *(NAMES.get(key, key.replace("_", " ")) for key in numbers))
     return text_table(cells, header, words=len(words))
 
 
-def result_tables(outcome: Outcome) -> Iterator[str]:
-    """Lines for a terminal: IoU by method and plane, then how right depth is, as far as the truth tells."""
-    import pandas as pd
-
-    truth = outcome.dataset.truth
-    kind = "object" if truth is None else truth.mask_kind
-    rows = [row for row in outcome.score.planes if row["truth"] == kind and row["iou"] is not None]
-    if rows:
-        other = "nothing" if kind == "object" else "all in focus"
-        columns = {row["z_mm"]: f"{row['z_mm']:g} mm, {row['object'] or other}" for row in rows}
-        iou = pd.DataFrame(rows).pivot(index="method", columns="z_mm", values="iou")
-        iou.index.name = iou.columns.name = None
-        shown = iou.rename(columns=columns).to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
-        yield f"IoU of the masks\n{shown}"
-    depth = outcome.score.depth
-    if depth["within_1px"] is not None:
-        names = {"within_1px": "within 1 px", "within_3px": "within 3 px", "coverage": "answered"}
-        shares = pd.DataFrame([{text: depth[name] for name, text in names.items()}], [outcome.depth_method])
-        yield f"Depth, shares of {_pixels_of_depth(truth)}\n{shares.to_string(float_format='{:.3f}'.format)}"
-
-
-def _pixels_of_depth(truth: Truth | None) -> str:
-    """Of which pixels the errors of depth are."""
-    has_objects = truth is not None and truth.has_objects
-    return "the objects' pixels" if has_objects else "all pixels with a true depth"
-
-
-def depth_table(outcome: Outcome) -> "DataFrame":
+def _depth_table(outcome: Outcome) -> "DataFrame":
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
     rows: list[tuple[str, str]] = []
-    if depth["coverage"] is not None:
-        rows.append((f"share with an estimate, of {_pixels_of_depth(truth)}", f"{depth['coverage']:.1%}"))
+    if truth is not None and depth["coverage"] is not None:
+        pixels = "the objects' pixels" if truth.has_objects else "all pixels with a true depth"
+        rows.append((f"share with an estimate, of {pixels}", f"{depth['coverage']:.1%}"))
         for limit in (1, 3):
             name = f"within {limit} px of total disparity (by the best answer of one depth everywhere)"
             of_one_depth = depth["one_depth"][f"within_{limit}px"]
@@ -259,3 +297,103 @@ def depth_table(outcome: Outcome) -> "DataFrame":
             bound = f"{row['depth_sigma_px']:.3f} px of total disparity"
             rows.append((f"Cramér-Rao bound on the standard deviation for {row['name']}", bound))
     return text_table(rows, ("measure", "value"), words=2)
+
+
+def _slider_panels(pictures: Pictures) -> tuple[list[Panel], int]:
+    """Sections through the depth range, all at one exposure, and which is at the first plane of the analysis.
+
+    They are evenly spaced in total disparity, and their captions are depths.
+    """
+    outcome, grid = pictures.outcome, pictures.outcome.dataset.grid
+    z_mm, (near, far) = outcome.sections.z_mm, outcome.z_range_mm
+    near, far = min(near, z_mm.min()), max(far, z_mm.max())
+    span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
+    planes = FocalPlanes.at_depths(grid, z_mm[:1])  # one camera has one section for all depths
+    if span_px > 0:
+        step_px = max(span_px / (MAX_SLIDER_PLANES - 1), MIN_SLIDER_STEP_PX)
+        planes = FocalPlanes.between(grid, near, far, step_px).take(slice(None, None, -1))
+    stacks = (
+        reconstruct(outcome.dataset.counts_or_views, planes.take(slice(first, first + SECTIONS_AT_ONCE)))
+        for first in range(0, len(planes), SECTIONS_AT_ONCE)
+    )
+    images = each_in_threads(photo_uri, pictures.of_sections(stacks, pictures.smoothing_px))
+    captions = (f"{z:.4g} mm" for z in planes.z_mm)
+    panels = [*map(_panel, images, captions)]
+    off_px = planes.total_disparity_px - outcome.sections.planes.total_disparity_px[0]
+    return panels, int(np.abs(off_px).argmin())
+
+
+def _input_panels(pictures: Pictures) -> list[Panel]:
+    """The view in the middle: its photons, and at full light."""
+    dataset, step_px = pictures.outcome.dataset, pictures.step_px
+    k, l = dataset.grid.middle_camera
+    panels: list[Panel] = []
+    if dataset.has_counts:
+        view = dataset.counts.view(k, l)
+        image = photon_picture(view[pictures.box], step_px)
+        panels.append(_panel(drawing_uri(image), f"view ({k}, {l}): {view.sum()} photons"))
+    if dataset.views is not None:
+        sums, samples = colours_and_samples(dataset.views.view(k, l), dataset.views.cfa)
+        light = sums[pictures.box], samples[pictures.box]
+        panels.append(_panel(photo_uri(exposed([light], step_px)[0]), f"view ({k}, {l}) at full light"))
+    return panels
+
+
+def _plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
+    """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
+    outcome, middles, truth = pictures.outcome, pictures.middles, pictures.outcome.dataset.truth
+    true, what = None, "objects"
+    if truth is not None:
+        true = TrueFocus(outcome.sections.planes, truth).masks(truth.mask_kind)  # (Z, H, W)
+        what = "objects" if truth.are_objects_known else "what is in focus"
+    images = pictures.of_sections([outcome.sections], pictures.smoothing_px)
+    lights = {pictures.light: images}
+    if outcome.dataset.has_counts and outcome.full_light is not None:
+        lights["full light (Eq. 2)"] = pictures.of_sections([outcome.full_light], 0.0)
+    planes: list[tuple[str, list[Panel], list[Panel]]] = []
+    for plane, z in enumerate(outcome.sections.z_mm):
+        at = f"{z:g} mm"
+        sections = [_panel(photo_uri(light[plane]), f"section at {at}, {of}") for of, light in lights.items()]
+        if true is not None:
+            image = mask_image(middles(true[plane]))
+            sections.append(_panel(drawing_uri(image), f"truth: {what} at {at}"))
+        masks: list[Panel] = []
+        for focus in outcome.focus:
+            claim = middles(focus.in_focus[plane])
+            masks.append(_panel(photo_uri(images[plane] * claim[..., None]), f"{focus.method}, {at}"))
+            if true is not None:
+                image = agreement_image(claim, middles(true[plane]))
+                masks.append(_panel(drawing_uri(image), f"{focus.method}, {at}, compared with the truth"))
+        planes.append((at, sections, masks))
+    return planes
+
+
+def _depth_panels(pictures: Pictures) -> list[Panel]:
+    """The depth map, the truth and the error if there is a truth, and the confidence."""
+    truth, depth = pictures.outcome.dataset.truth, pictures.outcome.depth
+    z_mm, confidence = pictures.middles(depth.z_mm), pictures.middles(depth.confidence)
+    scale = DEPTH_COLOURS, pictures.outcome.z_range_mm, "mm"
+    panels = [_map("estimated depth, paler where less sure", z_mm, scale, confidence)]
+    if truth is not None:
+        true_mm = pictures.middles(truth.object_z_mm)
+        caption = "true depth of the objects" if truth.has_objects else "true depth"
+        panels.append(_map(caption, true_mm, scale))
+        is_known = np.isfinite(z_mm) & np.isfinite(true_mm)
+        error = np.subtract(z_mm, true_mm, out=np.full(z_mm.shape, np.nan), where=is_known)
+        limit = float(np.quantile(np.abs(error[is_known]), UNSATURATED_SHARE)) if is_known.any() else 1.0
+        limit = float(f"{max(limit, 1e-3):.1e}")
+        scale = ERROR_COLOURS, (-limit, limit), "mm, too far above 0"
+        panels.append(_map("estimated less true depth", error, scale))
+    confidence = np.where(np.isfinite(z_mm), confidence, np.nan)
+    scale = SHARE_COLOURS, (0.0, 1.0), "probability of an error below 1 px of total disparity"
+    return [*panels, _map("confidence", confidence, scale)]
+
+
+def _panel(uri: str, caption: str) -> Panel:
+    return {"image": uri, "caption": caption}
+
+
+def _map(caption: str, values: np.ndarray, scale: Scale, confidence: np.ndarray | None = None) -> Panel:
+    colours, limits, label = scale
+    image = map_image(values, colours, limits, confidence)
+    return _panel(drawing_uri(image), caption) | {"bar": colour_bar_uri(colours, limits, label)}

@@ -72,10 +72,8 @@ def run(
     """
     with writing(out, dataset, whole=True) as folder:
         outcome = analyse(dataset, planes, z_range_mm, methods, depth_method, report)
-        save_sections(folder, outcome.sections)
-        for focus in outcome.focus:
-            save_segmented(folder, focus)
-        save_depth(folder, outcome.depth)
+        for each in (outcome.sections, *outcome.focus, outcome.depth):
+            save_result(folder, each)
         write_json_safely(folder / SCORE, outcome.score.to_dict())
         write_report(folder / REPORT, outcome)
     return outcome
@@ -146,32 +144,29 @@ def _all_versions(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str
     return {name: ", ".join(filter(None, dict.fromkeys(each))) for name, each in versions.items()}
 
 
-def save_sections(folder: Path, sections: Sections) -> None:
-    """Write the counts and the coverage, whose quotient is the estimate."""
-    arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
-    pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
-    labels = SECTIONS_LABELS
-    if sections.counts.dtype.kind == "f":
-        labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
-    write_arrays_safely(folder / SECTIONS, arrays, labels, pattern)
+def save_result(folder: Path, result: Sections | Segmented | DepthMap) -> None:
+    """Write counts and coverage, whose quotient are sections; masks of a method; or a depth map.
 
-
-def save_segmented(folder: Path, focus: Segmented) -> None:
-    """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
-    arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
-    if focus.photon_in_focus is not None:
-        arrays["photon_in_focus"] = focus.photon_in_focus
-    path = folder / f"segmented_{focus.method}.zarr"
-    if path.parent != folder or path.exists():
-        raise InputError(f"method: {focus.method!r} is no file name, or the name of two methods")
-    attributes = {"method": focus.method, "hot_pixels": focus.hot_pixels}
-    write_arrays_safely(path, arrays, SEGMENTED_LABELS, attributes)
-
-
-def save_depth(folder: Path, depth: DepthMap) -> None:
-    """Write the depth map and its confidence."""
-    arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
-    write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS, {"hot_pixels": depth.hot_pixels})
+    Masks come with `photon_in_focus` if the method decides it, a depth map with its confidence.
+    """
+    if isinstance(result, Sections):
+        arrays = {"z_mm": result.z_mm, "counts": result.counts, "coverage": result.coverage}
+        pattern, labels = {} if result.cfa is None else {"cfa": result.cfa}, SECTIONS_LABELS
+        if result.counts.dtype.kind == "f":
+            labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
+        write_arrays_safely(folder / SECTIONS, arrays, labels, pattern)
+    elif isinstance(result, DepthMap):
+        arrays = {"z_mm": result.z_mm, "confidence": result.confidence}
+        write_arrays_safely(folder / DEPTH, arrays, DEPTH_LABELS, {"hot_pixels": result.hot_pixels})
+    else:
+        arrays = {"z_mm": result.z_mm, "in_focus": result.in_focus}
+        if result.photon_in_focus is not None:
+            arrays["photon_in_focus"] = result.photon_in_focus
+        path = folder / f"segmented_{result.method}.zarr"
+        if path.parent != folder or path.exists():
+            raise InputError(f"method: {result.method!r} is no file name, or the name of two methods")
+        attributes = {"method": result.method, "hot_pixels": result.hot_pixels}
+        write_arrays_safely(path, arrays, SEGMENTED_LABELS, attributes)
 
 
 def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthMap | None]:

@@ -1,28 +1,30 @@
 """Scores of a method on the public benchmark: of one that is run here, or of maps that were made elsewhere.
 
-Both are an evaluation with a submission.json, which names the authors.
-Photons, frames and full light of a scene are separate datasets, and one scene in the frame.
+Both are an evaluation with a submission.json, which names the authors. Photons, frames and full light of a
+scene are separate datasets, and one scene in the frame. Results made elsewhere are a folder:
+
+    submission.json                   whose they are: see `Submission`
+    ramp_photons_1/1000/depth.npz     z_mm (H, W) in mm, not finite where there is no answer, and, if there is
+                                      one, confidence (H, W) from 0 to 1
+                       /masks.npz     in_focus (Z, H, W), 0 or 1, at the depths of the dataset, in their order
+
+The first folder is that of the dataset; the second says from how many photons per view, or "full-light".
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError, model_validator
 
 from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent, write_json_safely
-from pcii.evaluation.comparison import Evaluation
+from pcii.evaluation.comparison import Evaluation, EvaluationJob, Task, measure, tasks_of
 from pcii.evaluation.evaluation_page import write_evaluation
-from pcii.evaluation.measurement import EvaluationJob, Task, measure, tasks_of
-from pcii.evaluation.method_names import named_method
+from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of, named_method
 from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
-from pcii.evaluation.submissions import (
-    RUN,
-    SCORED,
-    SUBMISSION,
-    ScoredSubmission,
-    read_maps,
-    read_submission,
-    tasks_of_submission,
-)
 from pcii.sections import planes_of, reconstruct
 from pcii.store import (
     BENCHMARK_FIELDS,
@@ -31,6 +33,7 @@ from pcii.store import (
     Collection,
     Dataset,
     Half,
+    first_fault,
     is_collection,
     open_collection,
     validated,
@@ -39,6 +42,54 @@ from pcii.types import FULL_LIGHT, DepthMap, Light, Segmented
 
 TYPICAL_PHOTONS = 1000.0
 """Photons per view at which scenes and times are compared: those of the paper."""
+SUBMISSION = "submission.json"
+DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
+MIN_MM, MAX_MM = 1e-3, 1e12
+"""Nearest and farthest depth of an answer: errors of others overflow."""
+Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
+RUN, SCORED = get_args(Made)
+Text = Annotated[str, StringConstraints(min_length=1)]
+AnySubmission = TypeVar("AnySubmission", bound="Submission")
+
+
+class Submission(BaseModel):
+    """What submission.json says: the benchmark, the name of the method, and more if its authors like.
+
+    The name is without `depth:`, and new for masks and for depth.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    benchmark: Text
+    method: Text
+    authors: Text | None = None
+    url: Text | None = None
+    description: Text | None = None
+    trained_on: Text | None = None
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return isinstance(self, ScoredSubmission) and self.made == RUN
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Full names of what may be scored: of the one method that was run, or of depth and masks in maps."""
+        return (self.method,) if self.is_run else (depth_name(self.method), self.method)
+
+    @model_validator(mode="after")
+    def _has_good_names(self) -> Self:
+        for name in self.methods:
+            check_name(name, "method", may_be_known=self.is_run)
+        return self
+
+
+class ScoredSubmission(Submission):
+    """What the submission.json of a folder of scores says; a method that was run has its full name there."""
+
+    made: Made
+    command_name: Text | None = None
+    half: Half
 
 
 @dataclass(frozen=True)
@@ -83,18 +134,14 @@ class BenchmarkJob(EvaluationJob):
     """
 
     def __init__(self, tasks: Sequence[Task], data: BenchmarkHalf, maps: Path | None = None) -> None:
-        super().__init__(tasks)
-        self.full_light, self.maps = data.full_light, maps
-
-    def full_light_of(self, task: Task) -> Dataset:
-        """The dataset in full light of the same scene."""
-        return self.full_light.get(task.dataset.name, task.dataset)
+        super().__init__(tasks, data.full_light)
+        self.maps = maps
 
     def estimate(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
         """Seconds (None of maps) and result of a task."""
         if self.maps is None:
             return super().estimate(task, data)
-        result = read_maps(self.maps, task)
+        result = _read_maps(self.maps, task)
         if isinstance(result, DepthMap):
             return None, result
         return None, Segmented(result, task.method.name, reconstruct(data.counts, planes_of(data, ())))
@@ -145,14 +192,19 @@ def score_submission(
     executor: Executor = THIS_PROCESS,
     report: Report = silent,
 ) -> Evaluation:
-    """Score the maps in a folder (see `pcii.evaluation.submissions`) on one half of a benchmark.
+    """Score the maps in a folder on one half of a benchmark.
 
     Raises `InputError` for a submission with a fault, before anything is scored.
     """
-    submission = read_submission(folder, data.benchmark)
-    tasks = tasks_of_submission(folder, data.datasets, submission.method)
+    submission = read_submission(folder, Submission)
+    if submission.benchmark != data.benchmark:
+        raise InputError(
+            f"{folder / SUBMISSION}: benchmark: is {submission.benchmark!r}, but the data are of "
+            f"{data.benchmark!r}"
+        )
+    tasks = _tasks_of_submission(folder, data.datasets, submission.method)
     for number, task in enumerate(tasks, start=1):
-        read_maps(folder, task)
+        _read_maps(folder, task)
         report("checks", number, len(tasks))
     scored = ScoredSubmission(**submission.model_dump(), made=SCORED, half=data.half)
     return _score(BenchmarkJob(tasks, data, folder.resolve()), scored, out, executor, report)
@@ -176,3 +228,92 @@ def _score(
 def by_scene(rows: Sequence[Row]) -> list[Row]:
     """Rows whose datasets belong to one scene of the frame if their titles are the same, in any light."""
     return [row | {"recipe": row["title"]} for row in rows]
+
+
+def read_submission(folder: Path, model: type[AnySubmission]) -> AnySubmission:
+    """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
+    file, expected = folder / SUBMISSION, f"expected a JSON object of {', '.join(model.model_fields)}"
+    if not file.is_file():
+        raise InputError(f"{file}: missing; {expected}")
+    try:
+        return model.model_validate_json(file.read_bytes())
+    except ValidationError as fault:
+        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None
+
+
+def _read_as_maps(*_: Any) -> Any:
+    raise AssertionError("maps are read, not computed")
+
+
+def _tasks_of_submission(folder: Path, datasets: Sequence[Dataset], method: str) -> list[Task]:
+    """The tasks that a submission has results of.
+
+    Whatever light it has masks or depth of, it has them of all datasets that have this light: else raises
+    `InputError`, as for files that are no result of a dataset and its light. Warns of other files.
+    """
+    possible = {
+        folder / dataset.name / str(light) / file: Task(dataset, light, NamedMethod(name, _read_as_maps))
+        for dataset in datasets
+        for light in dataset.lights
+        for file, name in ((MASKS, method), (DEPTH_MAP, depth_name(method)))
+        if file == DEPTH_MAP or light != FULL_LIGHT
+    }
+    present = {*folder.glob("*/*/[!.]*")}
+    for file in sorted(present):
+        if file not in possible or not file.resolve().is_relative_to(folder.resolve()):
+            raise InputError(
+                f"{file}: is no result of this half, or a link out of the folder; expected files "
+                f"DATASET/LIGHT/{DEPTH_MAP} or {MASKS}"
+            )
+    tasks = {file: possible[file] for file in possible if file in present}
+    others = sorted({*folder.glob("[!.]*"), *folder.glob("*/[!.]*")} - {folder / SUBMISSION})
+    if names := ", ".join(str(file.relative_to(folder)) for file in others if not file.is_dir()):
+        warnings.warn(f"{folder}: not used: {names}", stacklevel=2)
+    if not tasks:
+        raise InputError(f"{folder}: has no results of a dataset of this half")
+    kinds = {(task.light, task.method.name) for task in tasks.values()}
+    for file, task in possible.items():
+        if file not in tasks and (task.light, task.method.name) in kinds:
+            raise InputError(f"{file}: is missing, and of this light it is needed of all datasets")
+    return list(tasks.values())
+
+
+def _read_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
+    """Depth, or masks (Z, H, W) bool, of a task in a submission; `InputError`, naming the file."""
+    inside, shape = folder / task.dataset.name / str(task.light), task.dataset.grid.shape_HW
+    if estimator_of(task.method.name) is not None:
+        return _read_depth(inside / DEPTH_MAP, shape)
+    shapes = {"in_focus": (len(planes_of(task.dataset, ()).z_mm), *shape)}
+    masks = _read_arrays(inside / MASKS, shapes)["in_focus"]
+    if not np.isin(masks, (0, 1)).all():
+        raise InputError(f"{inside / MASKS}: in_focus: expected 0 and 1, or bool")
+    return masks.astype(bool)
+
+
+def _read_depth(file: Path, shape: tuple[int, int]) -> DepthMap:
+    arrays = _read_arrays(file, {"z_mm": shape, "confidence": shape})
+    has_answer = np.isfinite(arrays["z_mm"])
+    z_mm = np.where(has_answer, arrays["z_mm"], np.nan).astype(np.float64)
+    if ((z_mm < MIN_MM) | (z_mm > MAX_MM)).any():
+        raise InputError(f"{file}: z_mm: expected {MIN_MM:g} to {MAX_MM:g} mm, or NaN for no answer")
+    confidence = arrays.get("confidence", has_answer)
+    if not ((confidence >= 0) & (confidence <= 1)).all():
+        raise InputError(f"{file}: confidence: expected numbers from 0 to 1, also where there is no depth")
+    return DepthMap(z_mm, np.where(has_answer, confidence, 0.0).astype(np.float64))
+
+
+def _read_arrays(file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:
+    """Arrays of an .npz file with these shapes, the first of which is needed; else raises `InputError`."""
+    first, *_ = shapes
+    described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except Exception as fault:  # damaged archives raise various exceptions
+        raise InputError(f"{file}: no .npz file of numbers, as numpy.savez writes it ({fault})") from None
+    is_right = {
+        name: array.shape == shapes.get(name) and array.dtype.kind in "fiub" for name, array in arrays.items()
+    }
+    if first not in arrays or not all(is_right.values()):
+        raise InputError(f"{file}: expected numbers {described}, of which {first} is needed")
+    return arrays

@@ -54,8 +54,8 @@ class NamedMethod:
 def software_of(method: NamedMethod) -> dict[str, str] | None:
     """All software that the result of a method follows from: versions, and hashes of sources.
 
-    For a method of another package this is also the source of that package. The source
-    is every file of a package, so also the weights of a network. None for a function that has no source.
+    For a method of another package this is also the source of that package: every file, so also the weights
+    of a network. None for a function that has no source.
     """
     estimator = estimator_of(method.name)
     if method.source:
@@ -68,29 +68,17 @@ def software_of(method: NamedMethod) -> dict[str, str] | None:
 
 
 def depth_name(estimator: str) -> str:
-    """Name of an estimator of depth among all methods.
-
-    >>> depth_name("posterior")
-    'depth:posterior'
-    """
+    """Name of an estimator of depth among all methods, such as "depth:posterior"."""
     return _PREFIX + estimator
 
 
 def estimator_of(method: str) -> str | None:
-    """The estimator of depth that a method's full name means; None for a removal.
-
-    >>> estimator_of("depth:posterior"), estimator_of("three-step")
-    ('posterior', None)
-    """
+    """The estimator of depth that a method's full name means; None for a removal."""
     return method.removeprefix(_PREFIX) if method.startswith(_PREFIX) else None
 
 
 def methods_for(*, full_light: bool) -> tuple[str, ...]:
-    """Full names of the methods that take radiance (`full_light`) or photon counts: removal, then depth.
-
-    >>> methods_for(full_light=True)
-    ('depth:posterior', 'depth:variance-sweep', 'depth:structure-tensor')
-    """
+    """Full names of the methods that take radiance (`full_light`) or photon counts: removal, then depth."""
     others = [name for name in depth_methods() if name not in BUILT_IN]
     estimators = [*(FOR_VIEWS if full_light else FOR_COUNTS), *others]
     removal = () if full_light else removal_methods()

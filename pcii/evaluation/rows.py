@@ -11,7 +11,7 @@ blur, `within_1px` and the other scores of depth, with dots for what is nested, 
 
 import json
 import os
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,8 +30,6 @@ Row = dict[str, Any]
 Key = tuple[str, float | str | None, str, tuple[float, ...]]
 HEAD = ("scene", "light", "method", "dataset", "seed", "identity", "recipe", "z_mm", "objects")
 """Columns of the frame of an evaluation that say of what a row is: no measure has such a name."""
-MAX_COLUMNS = 300
-"""Some three times what the measures need; a page takes 10 ms for each."""
 
 
 def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -41,14 +39,6 @@ def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield from leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
-
-
-def _measures(scores: Any) -> Any:
-    """Scores by their dotted names; raises ValueError for a name of another column of the frame."""
-    measures = dict(leaves(scores)) if isinstance(scores, dict) else {}
-    if names := {*HEAD} & measures.keys():
-        raise ValueError(f"{min(names)!r} is no name of a measure")
-    return measures or scores
 
 
 def _plane_parts(plane: Mapping[str, Any]) -> Row:
@@ -66,7 +56,8 @@ def _row_model() -> "TypeAdapter[Any]":
 
     from pcii.store import OPEN, Text
 
-    is_not_negative, by_names = Field(ge=0), BeforeValidator(_measures)
+    is_not_negative = Field(ge=0)
+    by_names = BeforeValidator(lambda scores: dict(leaves(scores)) if isinstance(scores, dict) else scores)
 
     class Plane(TypedDict):
         __pydantic_config__ = OPEN  # type: ignore[misc]
@@ -155,8 +146,6 @@ def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
         try:
             row = json.loads(line)
             _row_model().validate_python(row)
-            if not (row.get("depth") or row.get("planes")):
-                raise ValueError("no scores")
             rows[key_of(row)] = row
         except (ValueError, TypeError, RecursionError) as fault:
             sentence = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
@@ -170,13 +159,13 @@ def origin_of(rows: Sequence[Row]) -> dict[str, Any]:
 
     `differing` names what has several versions or sources.
     """
-    software: dict[str, Counter[str]] = defaultdict(Counter)
-    for row in rows:
-        for name, number in (row.get("software") or {}).items():
-            software[name][number] += 1
+    import pandas as pd
+
+    columns = pd.DataFrame([row.get("software") or {} for row in rows]).items()
+    software = {str(name): column.value_counts(sort=False).to_dict() for name, column in columns}
     days = sorted(row["date"] for row in rows if "date" in row)
     return {
-        "software": {name: dict(numbers) for name, numbers in software.items()},
+        "software": software,
         "differing": sorted(name for name, numbers in software.items() if len(numbers) > 1),
         "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
         "days": [days[0], days[-1]] if days else [],
@@ -189,26 +178,20 @@ def read_frame(out: str | Path) -> "DataFrame":
 
 
 def frame_of(rows: Sequence[Row]) -> "DataFrame":
-    """The frame of rows, scenes in their order; raises `InputError` for more than `MAX_COLUMNS` measures."""
+    """The frame of rows, scenes in their order."""
     import pandas as pd
 
     labels = _labels(rows)
     records = [
-        {
-            "scene": labels[row["title"], row["recipe"]],
-            "light": "by exposure" if row["budget"] is None else row["budget"],
-        }
+        {"scene": labels[row["title"], row["recipe"]]}
+        | {"light": "by exposure" if row["budget"] is None else row["budget"]}
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
         | measured
         for row in rows
-        for measured in ([_of_depth(row)] if "depth" in row else _of_planes(row))
+        for measured in _measured(row)
     ]
-    if len(set().union(*records)) > MAX_COLUMNS:
-        raise InputError(
-            f"{ROWS}: expected the same measures in all rows, not more than {MAX_COLUMNS} different ones"
-        )
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
     frame[texts] = frame[texts].map(_encodable, na_action="ignore")
@@ -226,20 +209,18 @@ def _encodable(text: str) -> str:
     return text.encode(errors="backslashreplace").decode()
 
 
-def _of_depth(row: Row) -> Row:
-    return dict(leaves(row["depth"])) | ({"bound_px": row["bound_px"]} if "bound_px" in row else {})
-
-
-def _of_planes(row: Row) -> Iterable[Row]:
-    """A record for each plane, with its scores against both kinds of truth."""
+def _measured(row: Row) -> Iterable[Row]:
+    """A record of depth, or one for each plane, with its scores against both kinds of truth."""
+    if "depth" in row:
+        return [dict(leaves(row["depth"])) | {name: row[name] for name in ("bound_px",) if name in row}]
     records: dict[float, Row] = {}
-    for plane in row["planes"]:
+    for plane in row.get("planes", ()):
         record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
         scores = dict(leaves(_plane_parts(plane)["scores"]))
         if plane["truth"] == "object":
             record |= {"objects": plane["object"]} | scores
         else:
-            record |= {f"pixel_{name}": scores[name] for name in scores}
+            record |= {f"pixel_{name}": score for name, score in scores.items()}
     return records.values()
 
 
@@ -259,7 +240,7 @@ def _labels(rows: Sequence[Row]) -> dict[tuple[str, str], str]:
             for recipe, texts in by_recipe.items()
         }
         for recipe, words in parts.items():
-            if len(parts) > 1 and list(parts.values()).count(words) > 1:
+            if list(parts.values()).count(words) > 1:
                 # A scene that was changed, or has no recipe, differs in no setting.
                 words = [*words, f"recipe {recipe[:8]}"]
             labels[title, recipe] = f"{title} ({', '.join(words)})" if words else title

@@ -184,15 +184,8 @@ class _Pose:
 
     def of_truth(self, truth: Truth) -> Truth:
         """The truth of the part."""
-        return replace(
-            truth,
-            z_mm=self.of_map(truth.z_mm),
-            object_id=self.of_map(truth.object_id),
-            photons=None,
-            normal=None,
-            coverage=None,
-            visible_views=None,
-        )
+        others = dict.fromkeys(("photons", "normal", "coverage", "visible_views"))
+        return replace(truth, z_mm=self.of_map(truth.z_mm), object_id=self.of_map(truth.object_id), **others)
 
 
 def _thinned(
@@ -204,10 +197,9 @@ def _thinned(
             f"{dataset.path}: has frames of {counts.readout.bits} bits, of which no less light can be drawn; "
             "leave out photons"
         )
-    light, views = dataset.light, dataset.grid.view_count
-    is_stated = light.photons is not None and light.scope == "view"
-    most = light.photons if is_stated else dataset.counts.total / views
-    assert most is not None
+    light = dataset.light
+    most = light.photons if light.scope == "view" else None
+    most = dataset.counts.total / dataset.grid.view_count if most is None else most
     if photons[0] > most:
         raise InputError(f"{dataset.path}: has {most:.4g} photons per view, fewer than photons[0] asks for")
     target = math.exp(rng.uniform(*np.log(photons)))
@@ -219,12 +211,8 @@ def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
     plane, off_px = focus.blur_px.argmin(axis=0), 2 * focus.blur_px.min(axis=0)
     reach_px = np.diff(np.sort(total_disparity_px(planes.grid, planes.z_mm))).max() / 2
     is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (off_px <= reach_px)
-    return {
-        "z_mm": truth.z_mm.astype(np.float32),
-        "object_id": truth.object_id.astype(np.int16),
-        "in_focus": focus.by_pixel,
-        "plane": np.where(is_known, plane, -1).astype(np.int64),
-    }
+    fields = {"z_mm": truth.z_mm.astype(np.float32), "object_id": truth.object_id.astype(np.int16)}
+    return fields | {"in_focus": focus.by_pixel, "plane": np.where(is_known, plane, -1).astype(np.int64)}
 
 
 def _of_split(

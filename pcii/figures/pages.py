@@ -1,4 +1,4 @@
-"""Pages of HTML from the templates of this room, and tables of text for them and for Markdown.
+"""Pages of HTML from the templates of this room, and tables of text for them.
 
 A table is a data frame of texts, and its index names the rows: the levels of the index are the first columns,
 aligned to the left. A page fetches nothing and runs nothing, or the one script that comes with its template,
@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pcii.base import in_markdown, visible
+from pcii.base import visible
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -76,17 +76,3 @@ def table_html(table: "DataFrame", title: str, css_class: str = "") -> "Markup":
     classes = f"wide words-{table.index.nlevels} {css_class}"
     region = Markup('<div class="{}" tabindex="0" role="region" aria-label="{}">\n{}</div>')
     return region.format(classes.strip(), visible(title), Markup(style.to_html(exclude_styles=True)))
-
-
-def table_markdown(table: "DataFrame") -> str:
-    """A table in Markdown, all texts escaped.
-
-    >>> print(table_markdown(text_table([("a|b", "1")], ("what", "value"))))
-    | what | value |
-    | :-- | --: |
-    | a\\|b | 1 |
-    """
-    columns = table.reset_index()
-    header, *rows = (map(in_markdown, row) for row in [[*columns.columns], *columns.to_numpy().tolist()])
-    rule = [":--"] * table.index.nlevels + ["--:"] * len(table.columns)
-    return "\n".join(f"| {' | '.join(row)} |" for row in (header, rule, *rows))

@@ -44,8 +44,7 @@ def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
     """
     encoded = linear_to_srgb(np.nan_to_num(linear) / max(white, 1e-30))
     image = np.round(255 * encoded).astype(np.uint8)
-    if image.ndim == 2:
-        image = image[..., None]
+    image = image if image.ndim == 3 else image[..., None]
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
 
 
@@ -103,10 +102,8 @@ def smoothed(sums: np.ndarray, samples: np.ndarray, sigma: float) -> tuple[np.nd
     """Sums and numbers of samples (h, w, C), each averaged by a Gaussian: their ratio is a mean again."""
     from scipy.ndimage import gaussian_filter
 
-    first, second = (
-        gaussian_filter(values.astype(np.float64), (sigma, sigma, 0)) for values in (sums, samples)
-    )
-    return first, second
+    sigmas = sigma, sigma, 0
+    return gaussian_filter(sums.astype(float), sigmas), gaussian_filter(samples.astype(float), sigmas)
 
 
 def filled_means(sums: np.ndarray, samples: np.ndarray) -> np.ndarray:
@@ -136,7 +133,7 @@ def exposed(
     They are shown in blocks of `step_px` x `step_px` pixels, smoothed by a Gaussian with a standard deviation
     of `smoothing_px` pixels.
     """
-    blocks: list[tuple[np.ndarray, np.ndarray]] = []
+    blocks = list[tuple[np.ndarray, np.ndarray]]()
     for image in images:
         sums, samples = (_image_block_sums(values, step_px) for values in image)
         if smoothing_px:
@@ -197,19 +194,14 @@ def depth_image(
     return map_image(z_mm, DEPTH_COLOURS, (near_mm, far_mm), confidence)
 
 
-def png_bytes(image: np.ndarray) -> bytes:
-    """An 8-bit RGB image (H, W, 3) as PNG."""
-    return _file_bytes(image, "PNG", optimize=True)
-
-
 def write_png(path: Path, image: np.ndarray) -> None:
     """Write an 8-bit RGB image (H, W, 3)."""
-    write_bytes_safely(path, png_bytes(image))
+    write_bytes_safely(path, _file_bytes(image, "PNG", optimize=True))
 
 
 def drawing_uri(image: np.ndarray) -> str:
     """An 8-bit RGB image as a data URI that keeps every bit."""
-    return uri_of("png", png_bytes(image))
+    return uri_of("png", _file_bytes(image, "PNG", optimize=True))
 
 
 def photo_uri(image: np.ndarray) -> str:

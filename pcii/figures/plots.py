@@ -1,8 +1,6 @@
 """What each type shows of itself: `draw` is the `.plot()` of all, and `picture_html` their page in notebooks.
 
-This room comes before the types, so a value is known by the name of its class. Every function draws into the
-Matplotlib `axes` that it gets, by default of a new figure, and returns them as an array (N,), one for each
-panel.
+This room comes before the types, so a value is known by the name of its class.
 """
 
 import math
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base import InputError, evenly_chosen, visible
-from pcii.figures.panels import (
+from pcii.figures.charts import (
     COLOURS,
     GRID_COLOUR,
     MAX_PANELS,
@@ -62,18 +60,15 @@ def draw(value: Any, axes: Any = None, *, style: str = "screen", **options: Any)
     with in_style(style):
         panels = DRAWINGS[type(value).__name__](value, axes, **options)
         if style == "paper":
-            for panel, mm_per_px in zip(panels, _pixel_sizes_mm(value, len(panels)), strict=True):
+            sections = getattr(value, "sections", value)
+            sizes_mm: Sequence[float | None] = [None] * len(panels)
+            if hasattr(sections, "planes"):
+                z_mm, grid = sections.z_mm, sections.grid
+                planes = evenly_chosen(len(z_mm), len(panels))
+                sizes_mm = [float(z_mm[plane]) * grid.pixel_mm / grid.focal_mm for plane in planes]
+            for panel, mm_per_px in zip(panels, sizes_mm, strict=True):
                 _draw_scale_bar(panel, mm_per_px)
     return panels
-
-
-def _pixel_sizes_mm(value: Any, count: int) -> list[float] | list[None]:
-    """How wide a pixel is at the depth of each of the sections that are drawn; None for other pictures."""
-    sections = getattr(value, "sections", value)
-    if not hasattr(sections, "planes"):
-        return [None] * count
-    z_mm, grid = sections.z_mm, sections.grid
-    return [float(z_mm[plane]) * grid.pixel_mm / grid.focal_mm for plane in evenly_chosen(len(z_mm), count)]
 
 
 def picture_html(value: Any) -> str:
@@ -90,34 +85,24 @@ def picture_html(value: Any) -> str:
     return f'{line}<img src="{picture}">'
 
 
-def draw_counts(counts: Any, axes: Any, view: Any = None) -> np.ndarray:
-    """The photons of the camera `view`, (k, l), by default in the middle; in grey: few give false colours."""
-    k, l = _camera(counts.grid, view)
-    image = counts.view(k, l)
-    step_px = block_px(image.shape, PANEL_PX)
-    panels = several_axes(axes, 1, image.shape)
-    title = f"view ({k}, {l}), photons: {image.sum()}"
-    _show_picture(panels[0], photon_picture(image, step_px), image.shape, title, step_px)
-    return panels
+def draw_view(images: Any, axes: Any, view: Any = None) -> np.ndarray:
+    """The elemental image of the camera `view`, (k, l), by default in the middle.
 
-
-def draw_views(views: Any, axes: Any, view: Any = None) -> np.ndarray:
-    """The elemental image of the camera `view`, by default in the middle, in colours."""
-    k, l = _camera(views.grid, view)
-    shape_HW = views.grid.shape_HW
-    step_px = block_px(shape_HW, PANEL_PX)
-    panels = several_axes(axes, 1, shape_HW)
-    (image,) = exposed([views.in_colours(k, l)], step_px)
-    _show_picture(panels[0], image, shape_HW, f"view ({k}, {l})", step_px)
-    return panels
-
-
-def _camera(grid: Any, view: Any) -> tuple[Any, Any]:
-    if view is None:
-        return grid.middle_camera
+    Photons are in grey: few give false colours.
+    """
+    view = images.grid.middle_camera if view is None else view
     if not isinstance(view, tuple | list) or len(view) != 2:
         raise InputError(f"view: expected a camera (k, l), got {view!r}")
-    return view[0], view[1]
+    (k, l), shape_HW = view, images.grid.shape_HW
+    step_px, title = block_px(shape_HW, PANEL_PX), f"view ({k}, {l})"
+    if hasattr(images, "in_colours"):
+        (picture,) = exposed([images.in_colours(k, l)], step_px)
+    else:
+        photons = images.view(k, l)
+        picture, title = photon_picture(photons, step_px), f"{title}, photons: {photons.sum()}"
+    panels = several_axes(axes, 1, shape_HW)
+    _show_picture(panels[0], picture, shape_HW, title, step_px)
+    return panels
 
 
 def draw_sections(sections: Any, axes: Any, focus: Any = None) -> np.ndarray:
@@ -183,8 +168,7 @@ def _draw_depths(
         _write_in_middle(axes, "no depth is known")
         return
     _show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
+    figure: Any = axes.get_figure(root=True)
     bar = figure.colorbar(colour_scale(DEPTH_COLOURS, limits), ax=axes, label="depth z (mm)")
     bar.ax.invert_yaxis()  # near is on top
 
@@ -220,11 +204,8 @@ def _show_picture(
     height, width = shape_HW
     bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
     axes.imshow(image, extent=(-0.5, right, bottom, -0.5))
-    axes.set_xlim(-0.5, width - 0.5)
-    axes.set_ylim(height - 0.5, -0.5)
-    axes.set_title(title)
-    axes.set_xlabel("column (px)")
-    axes.set_ylabel("row (px)")
+    axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+    axes.set(title=title, xlabel="column (px)", ylabel="row (px)")
     axes.locator_params(integer=True, nbins=6)
 
 
@@ -266,8 +247,8 @@ def _write_in_middle(axes: "Axes", text: str) -> None:
 
 
 DRAWINGS: dict[str, Callable[..., np.ndarray]] = {
-    "PhotonCounts": draw_counts,
-    "Views": draw_views,
+    "PhotonCounts": draw_view,
+    "Views": draw_view,
     "Sections": draw_sections,
     "Segmented": lambda focus, axes: draw_sections(focus.sections, axes, focus),
     "DepthMap": draw_depth,

@@ -1,8 +1,12 @@
-"""Errors of a depth map, in mm, px and by the 4D light field benchmark, and whether its confidence is right.
+"""Errors of a depth map, whether its confidence is right, and the Cramér-Rao bound on depth from photons.
 
-Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated. A
+Of errors: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated. A
 pixel without an estimate counts as bad in every share and as off by any amount in a median. Means are of the
 pixels with an estimate, whose share is given beside them.
+
+Of the bound: u total disparity in px; g gradient of the logarithm of the rate, per px; N photons; the
+rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k), where a_l = (l - (L-1)/2)
+d_x / u and b_k likewise. The Fisher information of u is then N (<a^2> <g_x^2> + <b^2> <g_y^2>).
 """
 
 from typing import Any
@@ -10,7 +14,17 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError
-from pcii.types import CameraGrid, DepthMap, Truth, parallax_px, total_disparity_px
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, TrueFocus
+from pcii.types import (
+    CameraGrid,
+    DepthMap,
+    Sections,
+    Truth,
+    blur_half_extent_px,
+    parallax_per_total,
+    parallax_px,
+    total_disparity_px,
+)
 
 MEASURES = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px", "bias_mm")
 MEASURES += ("bias_px", "within_1px", "within_3px", "brier", "quadratic_score")
@@ -24,6 +38,13 @@ CORRECT_PX = 1.0
 CONFIDENCE_BINS = 10
 PROBABILITY_TOLERANCE = 1e-6
 """By which a sum of probabilities may exceed 1, by rounding."""
+TEXTURE_SIGMA_PX = 0.5
+"""Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels
+without samples of a colour. Natural texture has larger gradients at finer scales: with 1 px bounds are 1.5
+times as large."""
+AWAY_FROM_EDGES_PX = 4
+"""Three standard deviations of the smoothing, one pixel of blur and one of the difference: no edge is
+included."""
 
 
 def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
@@ -31,19 +52,12 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
 
     The objects' pixels are those with a `Truth.object_z_mm`: all with a true depth, if no object is known.
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
-    since a dark backdrop has no photons to estimate depth from.
-    `within_1px` and `within_3px` are the shares of the pixels whose depth is as near to the truth, in px of
-    total disparity, and `bad_1px` and `bad_3px` the other pixels; `coverage` is the share with an estimate.
-    `median_mm` and `median_px` are medians of the absolute errors of all pixels, None where most have no
-    estimate; of the pixels with an estimate `mae_mm` and `mae_px` are the mean absolute errors, `bias_mm` and
-    `bias_px` the medians of signed errors, above 0 where depths are too far.
-    `brier` is the score of Brier (1950) of the confidence that a depth is within 1 px: the mean of (c - y)^2,
-    c the confidence, 0 without an estimate, and y 1 where that is so, else 0. Less is better, but it is 0
-    for who never answers. `quadratic_score`, within_1px - brier, is the mean of 2 c y - c^2 and as proper: 0
-    without answers, 1 if all are right and sure, below 0 if they are less often right than half of what
-    their confidence says.
-    `one_depth` has what the best answer of one depth everywhere would have, with the best confidence. All are
-    None without a depth map, and where no true depth is known.
+    since a dark backdrop has no photons to estimate depth from. Errors in px are of total disparity; signed
+    ones are above 0 where depths are too far. `brier` is the score of Brier (1950) of the confidence c that a
+    depth is within 1 px, the mean of (c - y)^2, y 1 where that is so, else 0; `quadratic_score`, within_1px -
+    brier, is the mean of 2 c y - c^2 and as proper. `one_depth` has what the best answer of one depth
+    everywhere would have, with the best confidence. docs/scores.md has every key. All are None without a
+    depth map, and where no true depth is known.
     """
     errors: dict[str, Any] = dict.fromkeys(MEASURES)
     errors["one_depth"] = dict.fromkeys(ONE_DEPTH_MEASURES)
@@ -127,14 +141,6 @@ def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, An
     `ece`, the expected calibration error (Naeini, Cooper and Hauskrecht 2015), is the mean of
     |correct - confidence| over the bins, weighted by their shares. Both are None without any estimate. Raises
     `InputError` for a confidence that is no probability.
-
-    >>> grid = CameraGrid(
-    ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=1, width=4
-    ... )
-    >>> true = Truth(np.full((1, 4), 500.0), np.ones((1, 4), dtype=int), {1: "wall"})
-    >>> depth = DepthMap(np.array([[500.0, 500.0, 500.0, 900.0]]), np.full((1, 4), 0.75))
-    >>> calibration(grid, depth, true)["ece"]
-    0.0
     """
     answered = _answered(depth.z_mm) & ~truth.is_unscored
     if not answered.any():
@@ -172,3 +178,91 @@ def _disparity_px(grid: CameraGrid, z_mm: np.ndarray) -> np.ndarray:
 
 def _mean(values: np.ndarray, where: np.ndarray) -> float | None:
     return float(values[where].mean()) if where.any() else None
+
+
+def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[float, float]) -> float | None:
+    """Least standard deviation of total disparity that any unbiased method can have, in px.
+
+    The Cramer-Rao bound 1 / sqrt(N (c_x <g_x^2> + c_y <g_y^2>)) for a surface at one depth with a known
+    texture of which all views together have N = `photons`; `gradient_squared` is (<g_x^2>, <g_y^2>), means
+    over the photons. None without information on depth: no photons, no texture or a single camera.
+    """
+    if total_disparity_px(grid, 1.0) == 0:
+        return None
+    d_x, d_y = parallax_per_total(grid)
+    # Mean squares of the cameras' shifts per px of total disparity: 0.102 for 10 cameras along an axis.
+    c_x, c_y = (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
+    information = photons * (c_x * gradient_squared[0] + c_y * gradient_squared[1])
+    return float(1 / np.sqrt(information)) if information > 0 else None
+
+
+def object_bounds(
+    truth: Truth, full_light: Sections | None, sections: Sections | None
+) -> list[dict[str, Any]]:
+    """For each object that is scored its photons, its texture, and the bound on its depth by both.
+
+    The texture is that of the full-light section at the object's plane, where the object is in focus there
+    and away from its edges. Photons are counted by origin if the truth has it, else in the object's pixels of
+    the photon section. `depth_sigma_px` is None without full light, texture or photons.
+    """
+    rows: list[dict[str, Any]] = []
+    planes, lit_planes = (
+        {} if each is None else TrueFocus(each.planes, truth).plane_of for each in (sections, full_light)
+    )
+    for number in sorted(set(truth.names) - truth.unscored):
+        photons = _photons(number, truth, sections, planes.get(number))
+        gradient = None if full_light is None else _texture(number, truth, full_light, lit_planes.get(number))
+        sigma = None
+        if full_light is not None and gradient is not None and photons is not None:
+            sigma = depth_bound_px(full_light.grid, photons, gradient)
+        rows.append(
+            {
+                "name": truth.names[number],
+                "photons": photons,
+                "log_gradient_per_px": None if gradient is None else float(np.sqrt(sum(gradient))),
+                "depth_sigma_px": sigma,
+            }
+        )
+    return rows
+
+
+def _photons(number: int, truth: Truth, sections: Sections | None, plane: int | None) -> int | None:
+    if truth.photons is not None:
+        return int(np.count_nonzero(truth.photons.object_id == number))
+    if sections is None:
+        return None
+    return 0 if plane is None else int(sections.counts[plane][truth.object_id == number].sum())
+
+
+def _texture(
+    number: int, truth: Truth, full_light: Sections, plane: int | None
+) -> tuple[float, float] | None:
+    """(<g_x^2>, <g_y^2>) per px^2 of an object in focus, over its photons away from edges; None without any.
+
+    Each colour is weighted by the photons at its pixels; a mean over photons of (grad rate / rate)^2 is
+    the sum of (grad rate)^2 / rate over that of rate.
+    """
+    from scipy.ndimage import binary_erosion, gaussian_filter
+
+    if plane is None:
+        return None
+    rows, cols = (np.flatnonzero((truth.object_id == number).any(axis=axis)) for axis in (1, 0))
+    # Its box is enough: what is away from edges is farther from them than the smoothing reaches.
+    box = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+    blur = blur_half_extent_px(full_light.grid, truth.z_mm[box], full_light.z_mm[plane])
+    sharp = (truth.object_id[box] == number) & (blur <= FOCUS_TOLERANCE_PX)
+    inside = np.asarray(binary_erosion(sharp, iterations=AWAY_FROM_EDGES_PX), dtype=bool)
+    if not inside.any():
+        return None
+    counts, coverage = full_light.counts[plane][box], full_light.coverage[plane][box]
+    smooth = {"sigma": (TEXTURE_SIGMA_PX, TEXTURE_SIGMA_PX, 0), "mode": "constant"}
+    samples = gaussian_filter(coverage.astype(np.float64), **smooth)
+    rate = gaussian_filter(counts.astype(np.float64), **smooth) / np.maximum(samples, 1e-9)
+    weight = coverage[inside].mean(axis=0, dtype=np.float64)
+    light = float((weight * rate[inside]).sum())
+    if light <= 0:
+        return None
+    down, across = (np.gradient(rate, axis=axis)[inside] for axis in (0, 1))
+    # A rate of 0 has no photons, so its gradient counts for nothing.
+    per_rate = weight / np.maximum(rate[inside], 1e-6 * rate.max())
+    return float((per_rate * across**2).sum() / light), float((per_rate * down**2).sum() / light)

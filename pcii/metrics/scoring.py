@@ -1,4 +1,4 @@
-"""Scores of masks, depth and entropies against the truth."""
+"""Scores against the truth: how masks, their outlines and photons agree with it, entropies, and depth."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -7,11 +7,24 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError
-from pcii.metrics.bounds import object_bounds
-from pcii.metrics.depth_accuracy import depth_errors
-from pcii.metrics.true_masks import KINDS, TrueFocus, mask_agreement, photon_agreement
+from pcii.metrics.depth_accuracy import depth_errors, object_bounds
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus, entropy_region
 from pcii.sections import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
-from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, blur_half_extent_px
+from pcii.types import (
+    CameraGrid,
+    DepthMap,
+    PhotonTruth,
+    Score,
+    Sections,
+    Segmented,
+    Truth,
+    blur_half_extent_px,
+)
+
+OUTLINE_TOLERANCE_PX = 2.0
+"""Outlines agree where they are at most this far apart."""
+
+Row = dict[str, float | None]
 
 
 def score(
@@ -25,33 +38,14 @@ def score(
 ) -> Score:
     """Compare in-focus masks and a depth map with the truth.
 
-    `planes` has a row for each method, plane and kind of truth. "object": the objects that belong to this
-    plane (`TrueFocus.plane_of`). "pixel": the points whose blur half-extent,
-    `|disparity(z) - disparity(z0)| (N - 1) / 2`, is at most 1 px. `mask_agreement` says how masks are
-    compared, with outlines of a tolerance of 2 px, located within pixels if the truth has `coverage`;
-    `entropy_before` and `entropy_after` are Eq. 9 of the section as a whole, before and after removal, in
-    bits; `claimed_share` is the share of the section that the mask keeps. `objects` is Table 1: the entropy
-    at each plane of the region of each object that is scored, which includes its blur at the other planes.
-    `depth` is `depth_errors`. `bounds` holds `depth_sigma_px` for each object, the least standard deviation
-    of its depth, from its texture in `full_light`, the sections of the radiance (Eq. 2). `readout` has the
-    frames of the counts.
+    `planes` has a row for each method, plane and kind of truth, by object and by pixel (`TrueFocus`), of
+    `mask_agreement`, photons, and Eq. 9 of the section before and after removal, in bits. `objects` is
+    Table 1: the entropy at each plane of the region of each object that is scored, which includes its blur at
+    the other planes. `depth` is `depth_errors`, `bounds` is `object_bounds`, by textures in `full_light`, the
+    sections of the radiance (Eq. 2). docs/scores.md has every key.
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.
-
-    >>> import pcii
-    >>> grid = pcii.CameraGrid(
-    ...     rows=2, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.25, height=8, width=12
-    ... )
-    >>> counts = pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    >>> z_mm, object_id = np.full((8, 12), np.inf), np.zeros((8, 12), dtype=int)
-    >>> z_mm[2:6, 2:6], object_id[2:6, 2:6] = 500.0, 1
-    >>> in_focus = np.zeros((1, 8, 12), dtype=bool)
-    >>> in_focus[0, 2:6, 2:10] = True
-    >>> focus = pcii.Segmented(in_focus, "by hand", pcii.reconstruct(counts, z_mm=500))
-    >>> row = score(focus, None, pcii.Truth(z_mm, object_id, {1: "card"})).planes[0]
-    >>> row["object"], row["iou"], row["precision"], row["recall"]
-    ('card', 0.5, 0.5, 1.0)
     """
     methods = [focus] if isinstance(focus, Segmented) else list(focus or ())
     if methods:
@@ -74,19 +68,19 @@ def score(
         for each in methods:
             if each.sections is sections:
                 rows += _plane_rows(each, pooled, true)
-    object_rows: list[dict[str, Any]] = []
-    if truth is not None:
-        object_rows = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    bounds = {"objects": object_rows}
-    readout = asdict(methods[0].sections.readout) if methods else None
+    first = methods[0].sections if methods else None
+    bounds = {"objects": [] if truth is None else object_bounds(truth, full_light, first)}
+    readout = None if first is None else asdict(first.readout)
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
 
 def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) -> list[dict[str, Any]]:
-    before, after = _section_entropies(focus, pooled)
     rows: list[dict[str, Any]] = []
+    maxima = pooled.max(axis=1).max(axis=1)  # ten times faster than max over both axes at once
     for plane, depth in enumerate(focus.z_mm):
-        photons = photon_agreement(focus, true, plane)
+        removed = pooled[plane] * focus.in_focus[plane][..., None]
+        before, after = (_mean_entropy_bits(each, maxima[plane]) for each in (pooled[plane], removed))
+        photons = _photon_agreement(focus, true, plane)
         for kind in KINDS:
             names = [] if true is None or kind == "pixel" else true.names_at(plane)
             mask = share = is_free = None
@@ -102,8 +96,8 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
                     "truth": kind,
                     **mask_agreement(focus.in_focus[plane], mask, share, is_free),
                     **photons[kind],
-                    "entropy_before": before[plane],
-                    "entropy_after": after[plane],
+                    "entropy_before": before,
+                    "entropy_after": after,
                     "claimed_share": float(focus.in_focus[plane].mean()),
                 }
             )
@@ -127,16 +121,9 @@ def object_share(mask: np.ndarray, object_id: np.ndarray, coverage: np.ndarray) 
     return coverage * mask + (1 - coverage) * masked_count / np.maximum(other_count, 1)
 
 
-def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
-    """Entropy of each section before and after removal, mean over the colours, in bits."""
-    maxima = pooled.max(axis=1).max(axis=1)  # ten times faster than max over both axes at once
-    before: list[float] = []
-    after: list[float] = []
-    for plane, mask, maximum in zip(pooled, focus.in_focus, maxima, strict=True):
-        colours = range(plane.shape[-1])
-        before.append(float(np.mean([entropy_bits(plane[..., c], maximum[c]) for c in colours])))
-        after.append(float(np.mean([entropy_bits(plane[..., c] * mask, maximum[c]) for c in colours])))
-    return before, after
+def _mean_entropy_bits(section_HWC: np.ndarray, maxima: np.ndarray) -> float:
+    """Eq. 9, mean over the colours."""
+    return float(np.mean([entropy_bits(section_HWC[..., c], top) for c, top in enumerate(maxima)]))
 
 
 def _object_rows(sections: Sections, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
@@ -152,14 +139,127 @@ def _object_rows(sections: Sections, pooled: np.ndarray, truth: Truth) -> list[d
     return rows
 
 
-def entropy_region(grid: CameraGrid, truth: Truth, number: int, z_mm: np.ndarray) -> np.ndarray:
-    """Region (H, W) bool of an object for Table 1: where it is seen, and its blur at any of the planes."""
-    from scipy.ndimage import distance_transform_cdt
+def mask_agreement(
+    claimed: np.ndarray,
+    true: np.ndarray | None,
+    true_share: np.ndarray | None = None,
+    is_free: np.ndarray | None = None,
+) -> dict[str, Any]:
+    """IoU, precision, recall, F1 and boundary F of two masks (H, W) bool, and what is claimed falsely.
 
-    mask = truth.object_id == number
-    if not mask.any():
-        return mask
-    blur = max(float(blur_half_extent_px(grid, truth.z_mm[mask], z).mean()) for z in z_mm)
-    # What as many dilations by the four neighbours would reach, in one pass.
-    distance_px = np.asarray(distance_transform_cdt(~mask, metric="taxicab"))
-    return distance_px <= max(1, round(2 * blur))
+    `true_share` (H, W) is the true share of each pixel's area, where that is known. Pixels `is_free` (H, W)
+    count as if they were not claimed. `everything` is the IoU and the false share of whoever claims the whole
+    film. What has nothing to be a share of is None, as all are without truth.
+
+    >>> agreement = mask_agreement(np.array([[True, True, False]]), np.array([[True, False, False]]))
+    >>> agreement["iou"], agreement["precision"], agreement["recall"]
+    (0.5, 0.5, 1.0)
+    """
+    if true is None:
+        unknown = dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f", "false_share"))
+        return {**unknown, "everything": {"iou": None, "false_share": None}}
+    counted = np.ones(true.shape, dtype=bool) if is_free is None else ~is_free
+    claimed = claimed & counted
+    both, positives, truths = (int(np.count_nonzero(mask)) for mask in (claimed & true, claimed, true))
+    either, counts = positives + truths - both, int(np.count_nonzero(counted))
+    return {
+        "iou": both / either if truths else None,
+        "precision": both / positives if positives else None,
+        "recall": both / truths if truths else None,
+        "f1": 2 * both / (positives + truths) if truths else None,
+        "boundary_f": boundary_f(claimed, true, true_share) if truths else None,
+        "false_share": (positives - both) / true.size,
+        "everything": {
+            "iou": truths / counts if truths else None,
+            "false_share": (counts - truths) / true.size,
+        },
+    }
+
+
+def _photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> dict[Kind, Row]:
+    """Precision and recall of the photons that a method keeps, by the origin of each, by kind of truth.
+
+    A photon is kept if `photon_in_focus` has its event or, without that, if the voxel of the section that it
+    is projected to is in the mask. It is rightly kept if its object belongs to the plane ("object"), or if
+    its first hit is in focus there ("pixel"). Photons projected outside the section do not count, and neither
+    do those of objects whose pixels may be claimed (`TrueFocus.is_free`). Raises `InputError` if
+    `photon_in_focus` has another number of events than the truth.
+    """
+    unknown: Row = {"photon_precision": None, "photon_recall": None}
+    if true is None or true.truth.photons is None:
+        return {"object": unknown, "pixel": unknown}
+    photons = true.truth.photons
+    row, col, inside = focus.sections.planes.project(photons, plane)
+    if focus.photon_in_focus is None:
+        claimed = focus.in_focus[plane][row[inside], col[inside]]
+    else:
+        claimed = _by_photon(focus.photon_in_focus[plane], photons)[inside]
+    object_id = photons.object_id[inside]
+    blur_px = blur_half_extent_px(true.planes.grid, photons.z_mm[inside], focus.z_mm[plane])
+    objects_at = [number for number, nearest in true.plane_of.items() if nearest == plane]
+    right = {"object": np.isin(object_id, objects_at), "pixel": blur_px <= FOCUS_TOLERANCE_PX}
+    rows: dict[Kind, Row] = {}
+    for kind in KINDS:
+        counted = ~true.is_free(kind, object_id, blur_px)
+        claimed_here, to_keep = claimed & counted, right[kind] & counted
+        both = int(np.count_nonzero(claimed_here & to_keep))
+        rows[kind] = {
+            "photon_precision": both / int(claimed_here.sum()) if claimed_here.any() else None,
+            "photon_recall": both / int(to_keep.sum()) if to_keep.any() else None,
+        }
+    return rows
+
+
+def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
+    """Values of events (N,) repeated for each of their photons, which are consecutive in the truth."""
+    places = np.stack([photons.k, photons.l, photons.i, photons.j])
+    event = np.cumsum(np.any(np.diff(places, axis=1, prepend=-1), axis=0)) - 1
+    events = int(event[-1]) + 1 if event.size else 0
+    if by_event.size != events:
+        raise InputError(
+            f"photon_in_focus: has {by_event.size} events, and the truth's photons belong to {events}; "
+            "for other counts give dataclasses.replace(truth, photons=None)"
+        )
+    return by_event[event]
+
+
+def boundary_f(claimed: np.ndarray, true: np.ndarray, true_share: np.ndarray | None = None) -> float:
+    """F-measure of the outlines of two masks (H, W): shares of each within 2 px of the other.
+
+    If `true_share` (H, W), the share of each pixel's area that is true, is given, both outlines are lines:
+    the true one where the share is one half, linear between pixel centres, the claimed one midway between
+    pixels. Else they are the outermost pixels of the masks. The frame's border is no outline. The result
+    is 0 if a mask has no outline.
+
+    >>> mask = np.pad(np.ones((4, 4), dtype=bool), 8)
+    >>> boundary_f(mask, mask), boundary_f(mask, np.roll(mask, 6, axis=1))
+    (1.0, 0.0)
+    """
+    from scipy.spatial import KDTree
+
+    if true_share is None:
+        claimed_px, true_px = _outermost_px(claimed), _outermost_px(true)
+    else:
+        claimed_px, true_px = _line_px(claimed), _line_px(true_share)
+    if not (len(claimed_px) and len(true_px)):
+        return 0.0
+    precision = (KDTree(true_px).query(claimed_px)[0] <= OUTLINE_TOLERANCE_PX).mean()
+    recall = (KDTree(claimed_px).query(true_px)[0] <= OUTLINE_TOLERANCE_PX).mean()
+    total = precision + recall
+    return float(2 * precision * recall / total) if total else 0.0
+
+
+def _outermost_px(mask: np.ndarray) -> np.ndarray:
+    """Row and column (N, 2) of the pixels of the mask with a neighbour (of four) outside it."""
+    p = np.pad(mask, 1, mode="edge")
+    return np.argwhere(mask & ~(p[:-2, 1:-1] & p[2:, 1:-1] & p[1:-1, :-2] & p[1:-1, 2:]))
+
+
+def _line_px(share: np.ndarray) -> np.ndarray:
+    """Points (N, 2), row and column, along the lines where shares are one half, at most 0.71 px apart."""
+    from skimage.measure import find_contours
+
+    # Contours run through squares of four pixel centres, so a picture one pixel wide is repeated.
+    wide = np.pad(share.astype(np.float64), [(0, int(size < 2)) for size in share.shape], mode="edge")
+    lines = [np.concatenate([line, (line[1:] + line[:-1]) / 2]) for line in find_contours(wide, 0.5)]
+    return np.concatenate([np.zeros((0, 2)), *lines])

@@ -9,7 +9,7 @@ import xarray
 from stored_datasets import flip_a_bit, largest_file, one_sentence
 from twins import unit_grid
 
-from pcii.app import load_estimates, save_depth, save_sections, save_segmented
+from pcii.app import load_estimates, save_result
 from pcii.app.results import writing
 from pcii.sections import reconstruct
 from pcii.store import RESULTS, RESULTS_FOLDER, Dataset, DatasetManifest, verify
@@ -38,7 +38,7 @@ def depth_of(z_mm: float) -> DepthMap:
 
 def save(out: Path, dataset: Dataset, z_mm: float, *, whole: bool = False) -> None:
     with writing(out, dataset, whole=whole) as folder:
-        save_depth(folder, depth_of(z_mm))
+        save_result(folder, depth_of(z_mm))
 
 
 def z_of(out: Path, dataset: Dataset) -> float:
@@ -53,7 +53,7 @@ def saved(tmp_path: Path) -> Path:
     out, dataset = tmp_path / "out", dataset_of(tmp_path)
     save(out, dataset, 0.7)
     with writing(out, dataset) as folder:
-        save_segmented(folder, masks_of(dataset))
+        save_result(folder, masks_of(dataset))
         (folder / "note.txt").write_text("looked at")
     return out
 
@@ -64,7 +64,7 @@ def test_masks_and_photons_come_back_as_they_were(tmp_path: Path, has_photons: b
     events = dataset.counts.events.n.size
     photons = np.random.default_rng(4).random((2, events)) < 0.5 if has_photons else None
     with writing(tmp_path / "out", dataset) as folder:
-        save_segmented(folder, masks_of(dataset, photons))
+        save_result(folder, masks_of(dataset, photons))
     (focus,), depth = load_estimates(tmp_path / "out", dataset)
     assert (depth, focus.method) == (None, "by-hand")
     np.testing.assert_array_equal(focus.in_focus, masks_of(dataset).in_focus)
@@ -105,7 +105,7 @@ def test_new_results_replace_those_of_their_name_or_all(saved: Path, tmp_path: P
 def test_a_failure_leaves_what_was_there(saved: Path, tmp_path: Path) -> None:
     def fail() -> None:
         with writing(saved, dataset_of(tmp_path)) as folder:
-            save_depth(folder, depth_of(0.9))
+            save_result(folder, depth_of(0.9))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -121,7 +121,7 @@ def test_a_second_writer_is_refused_and_what_a_kill_left_is_no_obstacle(tmp_path
     (tmp_path / ".out.abc.tmp" / "depth.zarr").mkdir(parents=True)
     with writing(out, dataset) as folder:
         assert "another run writes here" in one_sentence(lambda: save(out, dataset, 2), out)
-        save_depth(folder, depth_of(1))
+        save_result(folder, depth_of(1))
     assert z_of(out, dataset) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
@@ -139,9 +139,9 @@ def test_xarray_opens_results_with_named_axes_and_units(tmp_path: Path) -> None:
     dataset, out = dataset_of(tmp_path), tmp_path / "out"
     focus = masks_of(dataset, np.ones((2, dataset.counts.events.n.size), bool))
     with writing(out, dataset) as folder:
-        save_sections(folder, focus.sections)
-        save_segmented(folder, focus)
-        save_depth(folder, DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7)), hot_pixels=3))
+        save_result(folder, focus.sections)
+        save_result(folder, focus)
+        save_result(folder, DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7)), hot_pixels=3))
     assert xarray.open_zarr(out / "depth.zarr", consolidated=False).attrs["hot_pixels"] == 3
     for path in out.glob("*.zarr"):
         arrays = xarray.open_zarr(path, consolidated=False)

@@ -18,6 +18,7 @@ from pcii.evaluation import (
     SUBMISSION,
     BenchmarkHalf,
     Evaluation,
+    Submission,
     open_benchmark,
     read_submission,
     run_method,
@@ -59,7 +60,7 @@ FAULTS: dict[str, tuple[Change, str]] = {
     ),
     "a dataset that is not there": (
         lambda f: shutil.copytree(f / "pair_photons_1", f / "pear_photons_1"),
-        "pear_photons_1/.*: is no result of this half; expected files DATASET/LIGHT/depth.npz or masks.npz",
+        "pear_photons_1/.*: is no result of this half, .* files DATASET/LIGHT/depth.npz or masks.npz",
     ),
     "missing pieces": (
         lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
@@ -70,12 +71,12 @@ FAULTS: dict[str, tuple[Change, str]] = {
         "in_focus: expected 0 and 1",
     ),
     "another size": (lambda f: np.savez(f / DEPTH, z_mm=np.ones((66, 7))), NUMBERS),
-    "objects": (depth(None), f"depth.npz: {NUMBERS}"),
+    "objects": (depth(None), "depth.npz: no .npz file of numbers, as .*allow_pickle=False"),
     "below 0": (depth(-1.0), "z_mm: expected 0.001 to 1e.12 mm"),
-    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: damaged, or no .npz file"),
+    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: no .npz file of numbers, as"),
     "elsewhere": (
         lambda f: (f / DEPTH).symlink_to((f / DEPTH).rename(f.parent / "x")),
-        "depth.npz: expected a file of this folder, no link, of at most",
+        "depth.npz: is no result of this half, or a link out of the folder; expected files DATASET",
     ),
 }
 # What is done to scores of which a page is made, and what is said of it.
@@ -83,7 +84,6 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a row": (edit(ROWS, '"iou": 0', '"iou": 1', lists=False), f"{ROWS}.*; .* make or score it again"),
     "no list": (lambda f: (f / "evaluation.json").unlink(), "theirs: not a finished evaluation"),
     "text": (edit(ROWS, '"iou": [0-9.]+', '"iou": "0.5"'), "line 1: planes.0.scores.iou: .* a valid number"),
-    "2 GB": (lambda f: os.truncate(f / ROWS, 1 << 31), "all files may have 20000000 together"),
 }
 
 
@@ -251,17 +251,14 @@ def about(folder: Path, **members: str) -> Path:
 def test_names_that_could_be_taken_for_others_are_refused(name: str, tmp_path: Path) -> None:
     says = f"{SUBMISSION}: method: (expected a name of characters|the name '.*' is taken; choose another one)"
     with pytest.raises(InputError, match=says):
-        read_submission(about(tmp_path, method=name), "b")
+        read_submission(about(tmp_path, method=name), Submission)
 
 
-def test_names_of_any_language_are_taken_and_addresses_are_of_the_web(tmp_path: Path) -> None:
+def test_names_of_any_language_are_taken(tmp_path: Path) -> None:
     for name in ("Größe 2.1", "β-net, 3rd try", "深層ネット", "U-Net + CRF"):
-        assert read_submission(about(tmp_path, method=name), "b").methods == (f"depth:{name}", name)
+        assert read_submission(about(tmp_path, method=name), Submission).methods == (f"depth:{name}", name)
     good = {"authors": "José O’Brien & 李明", "url": "https://example.org/a?b=c#d"}
-    assert read_submission(about(tmp_path, **good), "b").model_dump().items() >= good.items()
-    for field, text in {"authors": "A.\u200b N.", "url": "javascript:x"}.items():
-        with pytest.raises(InputError, match=f"{SUBMISSION}: {field}: expected .*, got '.*'$"):
-            read_submission(about(tmp_path, **{field: text}), "b")
+    assert read_submission(about(tmp_path, **good), Submission).model_dump().items() >= good.items()
 
 
 def test_a_page_has_each_name_once_whatever_its_case(scored: Evaluation, tmp_path: Path) -> None:
@@ -269,7 +266,4 @@ def test_a_page_has_each_name_once_whatever_its_case(scored: Evaluation, tmp_pat
         shutil.copytree(scored.folder, tmp_path / folder)
         edit(SUBMISSION, '"method": "mine"', f'"method": "{name}"')(tmp_path / folder)
     with pytest.raises(InputError, match=r"ours and theirs are both of 'Mine', in upper or lower case$"):
-        write_page(tmp_path, tmp_path / "page.html")
-    edit(SUBMISSION, '"Mine"', '"yours"')(tmp_path / "theirs")
-    with pytest.raises(InputError, match=r"theirs/rows\.jsonl: has rows of '.*mine', which submission.json"):
         write_page(tmp_path, tmp_path / "page.html")
