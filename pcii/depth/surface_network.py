@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from pcii.base import each_in_threads, threads
 from pcii.depth.network_inputs import NETWORK_CELL_BLOCKS, NetworkInputs
 
 if TYPE_CHECKING:
@@ -54,8 +55,6 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     first, 1.5 lies between the second and the third. `inputs.hint` holds the same request.
     """
     import onnxruntime
-
-    from pcii.base import each_in_threads, threads
 
     trunk, head = _sessions(WEIGHTS, threads())
     options = onnxruntime.RunOptions()
