@@ -1,3 +1,4 @@
+from .camera_fit import MAX_DEPTHS as MAX_DEPTHS, MIN_DEPTH_SHARE as MIN_DEPTH_SHARE
 from .camera_fit import CameraFit as CameraFit, check_grid as check_grid
 from .hot_pixels import without_hot_pixels as without_hot_pixels
 from .shown_depth import ShownDepth as ShownDepth
