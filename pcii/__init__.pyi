@@ -20,7 +20,7 @@ from .exchange.stated_images import Optics as Optics, ViewOrder as ViewOrder
 from .metrics.scoring import score as score
 from .metrics.true_masks import TrueFocus as TrueFocus
 from .removal.methods import removal_methods as removal_methods, segment as segment
-from .removal.three_step.three_step_method import ThreeStep as ThreeStep
+from .removal.three_step_method import ThreeStep as ThreeStep
 from .sections.demosaicing import demosaic as demosaic
 from .sections.reconstruction import reconstruct as reconstruct
 from .store.collection import Collection as Collection, open_collection as open_collection

@@ -23,7 +23,6 @@ ROOMS = {
         "exchange",
         "evidence",
         "depth",
-        "removal.three_step",
         "removal",
         "metrics",
         "evaluation",

@@ -17,8 +17,7 @@ import torch  # pyright: ignore[reportMissingImports]
 from torch import Tensor  # pyright: ignore[reportMissingImports]
 
 from pcii.base import Report, silent
-from pcii.depth import NetworkInputs
-from pcii.depth.network_inputs import hint_of
+from pcii.depth import NetworkInputs, hint_of
 from pcii.depth.surface_network import MULTIPLE
 from training.examples import PIXELS, SAMPLES_PER_BLOCK, read_example, window
 from training.requests import draw_request

@@ -1,7 +1,7 @@
 """Compilation of loops with Numba, which needs no system library, and their threads.
 
-Modules of loops are imported where a loop is about to run, since importing Numba takes longer than the rest
-of the package. Compiled code is cached on disk, so each loop is compiled once per machine. Threads share
+Numba is imported where the first loop runs, since that takes longer than importing the rest of the package.
+Compiled code is cached on disk, so each loop is compiled once per machine. Threads share
 loops by ranges of their outermost index: Numba's own parallel loops take twice as long to compile, and their
 OpenMP threads do not survive a fork.
 """
@@ -10,19 +10,10 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, wraps
+from types import FunctionType
 from typing import Any, TypeVar
 
-import numba as nb
-
 from pcii.base.executor import threads_of_worker
-
-# Numba runs what its cache holds; a .numba_config.yaml in the working directory may not say where that is.
-nb.config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")  # type: ignore[attr-defined]
-
-compiled = nb.njit(nogil=True, cache=True)
-"""Decorator of a compiled function."""
-helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # type: ignore
-"""Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -31,6 +22,41 @@ PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
 _threads: int | None = None
+_helpers = set[FunctionType]()
+
+
+def helper(function: Any) -> Any:
+    """Decorator of a function that only compiled functions of its module call."""
+    _helpers.add(function)
+    return function
+
+
+def compiled(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Decorator of a function that is compiled when it is called for the first time."""
+
+    @wraps(function)
+    def run(*arguments: Any) -> Result:
+        return _compiled(function)(*arguments)
+
+    return run
+
+
+@cache
+def _compiled(function: Any) -> Any:
+    names, options = function.__globals__, {"nogil": True, "cache": True}
+    for name, value in list(names.items()):
+        if isinstance(value, FunctionType) and value in _helpers:  # has no entry from Python to compile
+            names[name] = _numba().njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(value)
+    return _numba().njit(**options)(function)
+
+
+@cache
+def _numba() -> Any:
+    import numba
+
+    # It runs what its cache holds; a .numba_config.yaml in the working directory may not say where that is.
+    numba.config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", "")  # type: ignore[attr-defined]
+    return numba
 
 
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
@@ -70,11 +96,9 @@ def shared(count: Callable[..., int]) -> Callable[[Callable[..., Result]], Calla
     """
 
     def decorate(loop: Callable[..., Result]) -> Callable[..., list[Result]]:
-        inner = compiled(loop)
-
         @wraps(loop)
         def run(*arguments: Any) -> list[Result]:
-            return in_threads(inner, count(*arguments), *arguments)
+            return in_threads(_compiled(loop), count(*arguments), *arguments)
 
         return run
 
@@ -89,7 +113,7 @@ def use_threads(count: int) -> None:
 
 def threads() -> int:
     """Number of threads that share a loop: all cores, a worker's share of them, or that of `use_threads`."""
-    allowed: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    allowed: int = _numba().config.NUMBA_NUM_THREADS
     return min(_threads or threads_of_worker() or allowed, allowed)
 
 

@@ -14,22 +14,13 @@ as the network has them, and move towards what it and the photons say together, 
 (docs/theory.md, "What hides what").
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base import block_sums, each_in_threads
-from pcii.depth.sheet_kernels import (
-    add_up,
-    expect_photons,
-    explain_photons,
-    grow_planes,
-    meet_sheets,
-    reach_sheets,
-)
-from pcii.depth.sheet_textures import smooth_texture, textures
-from pcii.depth.sheets import SheetModel, Sheets
+from pcii.base import block_sums, each_in_threads, helper, shared
+from pcii.depth.sheet_textures import LEAST_LEFT, smooth_texture, textures
+from pcii.depth.sheets import SheetModel, Sheets, posterior_after
 from pcii.evidence import doubled, gaussian_mean, gaussian_weights
 from pcii.types import DepthPosterior, PhotonCounts, parallax_per_total
 
@@ -40,7 +31,7 @@ TINY = np.finfo(np.float32).tiny
 
 
 class Rays(NamedTuple):
-    """Where N rays meet L sheets (`meet_sheets`): `blocks`, `order` (N, L + 1); and `colour` (N,) int8."""
+    """Where N rays meet L sheets (`_meet_sheets`): `blocks`, `order` (N, L + 1); and `colour` (N,) int8."""
 
     blocks: np.ndarray
     order: np.ndarray
@@ -54,14 +45,6 @@ class State(NamedTuple):
     masks: np.ndarray
     objective: float
     slope: np.ndarray
-
-
-class Explanation(NamedTuple):
-    """Probabilities (L, h, w) that each sheet is what is seen, `before` by the network alone and `after` by
-    the photons."""
-
-    before: np.ndarray
-    after: np.ndarray
 
 
 class ExplainedViews:
@@ -101,7 +84,7 @@ class ExplainedViews:
         """The same by colour, (S, Q, h, w)."""
         _, h, w = self.prior.shape
         sums = np.zeros((values.shape[1], colours, h * w), np.float32)
-        add_up(sums, rays.blocks, rays.colour, values)
+        _add_up(sums, rays.blocks, rays.colour, values)
         return sums.reshape(*sums.shape[:2], h, w)
 
     def _best_masks(self) -> np.ndarray:
@@ -137,15 +120,15 @@ class ExplainedViews:
         L, Q, photons, film = len(masks), self.samples.size, self.photons, self.film
         flat = masks.reshape(L, -1)
         photon_reach, film_reach = (np.zeros(rays.blocks.shape, np.float32) for rays in (photons, film))
-        reach_sheets(photons.blocks, photons.order, flat, photon_reach)
-        reach_sheets(film.blocks, film.order, flat, film_reach)
+        _reach_sheets(photons.blocks, photons.order, flat, photon_reach)
+        _reach_sheets(film.blocks, film.order, flat, film_reach)
         film_reach *= self.views[:, None]
         reached, exposure = self._of_colours(photons, photon_reach, Q), self._of_blocks(film, film_reach)
         T, photon_share = self._textures(masks, reached, exposure)
         sheet_state = flat, T.reshape(Q, L + 1, -1), photon_share.reshape(Q, L, -1)
         gain, loss = (np.empty((len(rays.blocks), L), np.float32) for rays in (photons, film))
-        likelihood = sum(explain_photons(*photons, photon_reach, sheet_state, gain))
-        expected = sum(expect_photons(film.blocks, film.order, self.samples, film_reach, sheet_state, loss))
+        likelihood = sum(_explain_photons(*photons, photon_reach, sheet_state, gain))
+        expected = sum(_expect_photons(film.blocks, film.order, self.samples, film_reach, sheet_state, loss))
         slope = self._of_blocks(photons, gain) - self._of_blocks(film, loss)
         return State(masks, likelihood - expected, slope)
 
@@ -177,8 +160,8 @@ def explain_posterior(
     for _ in range(model.sweeps):
         if not views.sweep():
             break
-    explanation = Explanation(sheets.visible(views.prior), sheets.visible(views.state.masks))
-    return posterior_after(posterior, sheets, explanation, model.least)
+    before, after = (sheets.visible(masks) for masks in (views.prior, views.state.masks))
+    return posterior_after(posterior, sheets, before, after, model.least)
 
 
 def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
@@ -196,7 +179,7 @@ def _wide_mean(values: np.ndarray, octave: int) -> np.ndarray:
 def _met(sheets: Sheets, rays: tuple[np.ndarray, ...], colour: np.ndarray) -> Rays:
     shape = rays[0].size, len(sheets.total_px) + 1
     blocks, order = np.empty(shape, np.int32), np.empty(shape, np.int8)
-    meet_sheets(blocks, order, sheets.total_px, rays)
+    _meet_sheets(blocks, order, sheets.total_px, rays)
     return Rays(blocks, order, colour)
 
 
@@ -244,7 +227,7 @@ def _rays(
     pixels: tuple[np.ndarray, np.ndarray],
     block_px: int,
 ) -> tuple[np.ndarray, ...]:
-    """The (u, v, a, b) (N,) float32 of `sheet_kernels` at places on the films of cameras, in px."""
+    """The (u, v, a, b) (N,) float32 of rays at places on the films of cameras, in px."""
     grid, (across, down) = counts.grid, parallax_per_total(counts.grid)
     rows, cols = cameras[0] - (grid.rows - 1) / 2, cameras[1] - (grid.cols - 1) / 2
     at = pixels[0] - rows * grid.shear_px[1], pixels[1] - cols * grid.shear_px[0]
@@ -252,51 +235,159 @@ def _rays(
     return tuple((part / block_px).astype(np.float32) for part in (*at, *moves))
 
 
-def posterior_after(
-    posterior: DepthPosterior, sheets: Sheets, explained: Explanation, least: float
-) -> DepthPosterior:
-    """The posterior whose planes near a sheet grow by the root of how much more it is seen.
+# Compiled: where rays meet sheets, and what photons and cameras see of them.
+#
+# A ray is the place (u, v) of a photon on the film of the virtual centre, in blocks, and by how much it moves
+# with each px of total disparity (a, b). Notation: N rays, L sheets and behind them, as number L, the light
+# without depth; n = h w blocks, Q colours. Of sheets from near to far, one is reached by a ray with the
+# probability t that no nearer one is there; m are masks and T textures, in photons per sample.
 
-    So do no surface and planes far from all sheets with the light without depth. Where the photons
-    around do not tell the depth the network's stays. The probability of being in focus at a requested plane
-    grows by as much as the sheets at the plane do, that of no plane by as much as the others and the light
-    without depth. Where nothing changes the posterior does not either.
+
+@helper
+def _block_at(total_px: np.ndarray, u: float, v: float, a: float, b: float) -> int:
+    """The block of a sheet (h, w) that a ray meets, by two steps to its own depth; -1 beyond the film."""
+    h, w = total_px.shape
+    i, j = min(max(int(u), 0), h - 1), min(max(int(v), 0), w - 1)
+    for _ in range(2):
+        depth = total_px[i, j]
+        i, j = min(max(int(u + a * depth), 0), h - 1), min(max(int(v + b * depth), 0), w - 1)
+    x, y = u + a * total_px[i, j], v + b * total_px[i, j]
+    return int(x) * w + int(y) if 0 <= x < h and 0 <= y < w else -1
+
+
+@shared(lambda blocks, *_: len(blocks))
+def _meet_sheets(
+    first: int,
+    last: int,
+    blocks: np.ndarray,
+    order: np.ndarray,
+    total_px: np.ndarray,
+    rays: tuple[np.ndarray, ...],
+) -> None:
+    """Fill the `blocks` (N, L + 1) int32 that rays meet, -1 where none, and the sheets met from near to far,
+    `order` (N, L + 1) int8, which ends with L.
+
+    The light without depth is met where the ray comes from, or at the nearest block of the film.
     """
-    before, after = (_with_nothing(visible) for visible in (explained.before, explained.after))
-    growth = _by_depth(sheets, after, least) / _by_depth(sheets, before, least)
-    in_focus = _in_focus_after(posterior.in_focus, sheets, before, growth)
-    probability, no_surface = posterior.probability.copy(), posterior.no_surface.copy()
-    planes_px = posterior.planes.total_disparity_px
-    # The network's planes know the same photons already, so that what sheets say of them counts half.
-    grow_planes(probability, no_surface, planes_px, sheets.total_px, sheets.same_px, np.sqrt(growth))
-    is_supported = posterior.is_supported
-    probability = np.where(is_supported, probability, posterior.probability)
-    no_surface = np.where(is_supported, no_surface, posterior.no_surface)
-    return replace(posterior, probability=probability, no_surface=no_surface, in_focus=in_focus)
+    u, v, a, b = rays
+    L, h, w = total_px.shape
+    depth = np.empty(L, np.float32)
+    for ray in range(first, last):
+        met = 0
+        for sheet in range(L):
+            block = _block_at(total_px[sheet], u[ray], v[ray], a[ray], b[ray])
+            blocks[ray, sheet] = block
+            if block < 0:
+                continue
+            depth[sheet] = total_px[sheet, block // w, block % w]
+            place = met
+            while place > 0 and depth[order[ray, place - 1]] < depth[sheet]:
+                order[ray, place] = order[ray, place - 1]
+                place -= 1
+            order[ray, place] = sheet
+            met += 1
+        order[ray, met] = L
+        i, j = min(max(int(u[ray]), 0), h - 1), min(max(int(v[ray]), 0), w - 1)
+        blocks[ray, L] = i * w + j
 
 
-def _with_nothing(visible: np.ndarray) -> np.ndarray:
-    """The probabilities (L + 1, h, w) of sheets (L, h, w), and of the light without depth."""
-    return np.concatenate([visible, 1 - visible.sum(axis=0, keepdims=True)])
+@shared(lambda blocks, *_: len(blocks))
+def _reach_sheets(
+    first: int, last: int, blocks: np.ndarray, order: np.ndarray, m: np.ndarray, reach: np.ndarray
+) -> None:
+    """Fill `reach` (N, L + 1) float32, the t of sheets that are met and of the light without depth, from
+    m (L, n)."""
+    L = len(m)
+    for ray in range(first, last):
+        t, place = np.float32(1), 0
+        while order[ray, place] < L:
+            sheet = order[ray, place]
+            reach[ray, sheet] = t
+            t *= np.float32(1) - m[sheet, blocks[ray, sheet]]
+            place += 1
+        reach[ray, L] = t
 
 
-def _by_depth(sheets: Sheets, visible: np.ndarray, least: float) -> np.ndarray:
-    """The probability (L + 1, h, w) that a sheet, or another at its depth, is what is seen, more by `least`;
-    and of the light without depth."""
-    depths, same_px = sheets.total_px, sheets.same_px
-    near = [(visible[:-1] * (np.abs(depths - depth) < same_px)).sum(axis=0) for depth in depths]
-    return np.stack([*near, visible[-1]]) + np.float32(least)
+@shared(lambda blocks, *_: len(blocks))
+def _explain_photons(
+    first: int,
+    last: int,
+    blocks: np.ndarray,
+    order: np.ndarray,
+    colour: np.ndarray,
+    reach: np.ndarray,
+    state: tuple[np.ndarray, ...],
+    gain: np.ndarray,
+) -> float:
+    """The sum of log q of photons, q how bright the sheets say that it is where they are.
+
+    `state` is m (L, n), T (Q, L + 1, n), and the share (Q, L, n) of each photon in the texture at its own
+    block, which is taken out of it. Fills `gain` (N, L), t log(T / q behind it).
+    """
+    m, T, photon_share = state
+    L = len(m)
+    total = 0.0
+    for ray in range(first, last):
+        q, behind, place = colour[ray], T[colour[ray], L, blocks[ray, L]], 0
+        while order[ray, place] < L:
+            place += 1
+        for nearer in range(place - 1, -1, -1):
+            sheet = order[ray, nearer]
+            block, t = blocks[ray, sheet], reach[ray, sheet]
+            texture = T[q, sheet, block]
+            others = max(texture - t * photon_share[q, sheet, block], texture * LEAST_LEFT)
+            gain[ray, sheet] = t * np.log(others / behind)
+            behind += m[sheet, block] * (others - behind)
+        total += np.log(behind)
+    return total
 
 
-def _in_focus_after(
-    in_focus: np.ndarray, sheets: Sheets, before: np.ndarray, growth: np.ndarray
-) -> np.ndarray:
-    """Probabilities (R, h, w) of being in focus, each times the mean `growth` of its sheets, normalised."""
-    weight = before + np.finfo(np.float32).eps
-    # The sheets of each requested plane, then those of no plane and the light without depth.
-    members = [np.append(is_at_plane, False) for is_at_plane in sheets.is_at]
-    members.append(np.append(~sheets.is_at.any(axis=0), True))
-    claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
-    for probability, member in zip(claimed, members, strict=True):
-        probability *= (weight[member] * growth[member]).sum(axis=0) / weight[member].sum(axis=0)
-    return claimed[:-1] / claimed.sum(axis=0)
+@shared(lambda blocks, *_: len(blocks))
+def _expect_photons(
+    first: int,
+    last: int,
+    blocks: np.ndarray,
+    order: np.ndarray,
+    samples: np.ndarray,
+    reach: np.ndarray,
+    state: tuple[np.ndarray, ...],
+    loss: np.ndarray,
+) -> float:
+    """The expected number of photons of rays, each with `samples` (Q,) float32 times the views that it stands
+    for, which `reach` is multiplied by.
+
+    Fills `loss` (N, L), by how much it grows with the mask of each sheet.
+    """
+    m, T, _ = state
+    L = len(m)
+    behind = np.empty(samples.size, np.float32)
+    total = 0.0
+    for ray in range(first, last):
+        place = 0
+        while order[ray, place] < L:
+            place += 1
+        for q in range(samples.size):
+            behind[q] = T[q, L, blocks[ray, L]]
+        for nearer in range(place - 1, -1, -1):
+            sheet = order[ray, nearer]
+            block = blocks[ray, sheet]
+            more = np.float32(0)
+            for q in range(samples.size):
+                difference = T[q, sheet, block] - behind[q]
+                more += samples[q] * difference
+                behind[q] += m[sheet, block] * difference
+            loss[ray, sheet] = reach[ray, sheet] * more
+        for q in range(samples.size):
+            total += reach[ray, order[ray, 0]] * samples[q] * behind[q]
+    return total
+
+
+@shared(lambda sums, *_: len(sums))
+def _add_up(
+    first: int, last: int, sums: np.ndarray, blocks: np.ndarray, colour: np.ndarray, values: np.ndarray
+) -> None:
+    """Add the `values` (N, S) of rays to the blocks that they meet of S sheets, (S, Q, n), by colour."""
+    for sheet in range(first, last):
+        for ray in range(len(blocks)):
+            if blocks[ray, sheet] >= 0:
+                sums[sheet, colour[ray], blocks[ray, sheet]] += values[ray, sheet]

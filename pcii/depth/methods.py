@@ -15,6 +15,7 @@ import numpy as np
 
 from pcii.base import InputError, MethodRegistry, called
 from pcii.depth.posterior_depth import NO_DEPTHS, PosteriorDepth, depth_map_of
+from pcii.evidence import MAX_DEPTHS, MIN_DEPTH_SHARE
 from pcii.sections import warn_of_saturation
 from pcii.types import (
     CameraGrid,
@@ -51,9 +52,8 @@ MOST_SPAN_PX = 2000.0
 """Largest change of total disparity between the ends of a range that is searched."""
 SMALL_FILM_PX = 256
 """Parallax in px from camera to camera up to which depths are searched on films of any size."""
-MODE_PX, LEAST_MODE, MOST_MODES = 2.0, 0.08, 4
-"""What is nearer in total disparity is in focus together: a blur half-extent of a pixel. The least share of a
-depth map that makes a plane worth looking at, and the number of planes that a report has room for."""
+MODE_PX = 2.0
+"""What is nearer in total disparity is in focus together: a blur half-extent of a pixel."""
 
 
 def estimate_depth(
@@ -100,27 +100,19 @@ def find_surfaces(
 ) -> tuple[tuple[float, ...], float]:
     """Depths in mm where the depth map has most surfaces, from near to far, and how sure its depths are.
 
-    The second is their mean confidence, the probability that a depth is right to 1 px of total disparity; 0
-    without any. For the rest see `estimate_depth`.
-    """
-    depth_map = estimate_depth(data, z_range_mm, method=method)
-    answered = np.isfinite(depth_map.z_mm)
-    sure = float(depth_map.confidence[answered].mean()) if answered.any() else 0.0
-    return modes_mm(depth_map, data.grid), sure
-
-
-def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
-    """Depths in mm at which a depth map has most surfaces, from near to far; empty without an answer.
-
     Around each is the largest share of the confidence that lies within `MODE_PX` of total disparity and
-    farther than twice that from the others, down to `LEAST_MODE`. At most `MOST_MODES`.
+    farther than twice that from the others, down to `MIN_DEPTH_SHARE`. There are at most `MAX_DEPTHS`, and
+    none without an answer. The second is the mean confidence, the probability that a depth is right to 1 px
+    of total disparity; 0 without any. For the rest see `estimate_depth`.
     """
+    depth, grid = estimate_depth(data, z_range_mm, method=method), data.grid
     answered = np.isfinite(depth.z_mm)
     total_px, weight = total_disparity_px(grid, depth.z_mm[answered]), depth.confidence[answered]
+    sure = float(weight.mean()) if answered.any() else 0.0
     order = np.argsort(total_px)
     total_px, weight = total_px[order], weight[order].astype(np.float64)
-    least, modes = LEAST_MODE * weight.sum(), list[float]()
-    while len(modes) < MOST_MODES and weight.any():
+    least, modes = MIN_DEPTH_SHARE * weight.sum(), list[float]()
+    while len(modes) < MAX_DEPTHS and weight.any():
         mass = np.concatenate([[0.0], np.cumsum(weight)])
         ends = np.searchsorted(total_px, total_px + 2 * MODE_PX, side="right")
         first = int(np.argmax(mass[ends] - mass[:-1]))
@@ -129,7 +121,7 @@ def modes_mm(depth: DepthMap, grid: CameraGrid) -> tuple[float, ...]:
             break
         modes.append(float(weight[window] @ total_px[window] / share))
         weight[np.abs(total_px - modes[-1]) <= 2 * MODE_PX] = 0
-    return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist())
+    return tuple(depth_of_total_disparity_mm(grid, np.array(sorted(modes, reverse=True))).tolist()), sure
 
 
 def depth_posterior(

@@ -12,15 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.base import box_around, on_pixels, window_sums
-from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
+from pcii.depth.explained_views import explain_posterior
+from pcii.depth.network_inputs import NetworkInputs, SurfacePrior, hint_of, inputs_of
 from pcii.depth.sheets import SheetModel, cut_sheets
-from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import MULTIPLE, run_network
 from pcii.evidence import (
     PHOTON_CELL_BLOCKS,
     ShownDepth,
     TextureEvidence,
     TextureModel,
+    doubled,
     evidence_of_texture,
     without_hot_pixels,
 )
@@ -127,8 +128,6 @@ class PosteriorDepth:
             data = in_memory(data)
         network = coarse = self._film_outputs(data, planes, inside, block_px, z_mm)
         if coarse_px > block_px:
-            from pcii.evidence import doubled
-
             coarse = self._film_outputs(data, planes, inside, coarse_px, z_mm)
             for mean, other in zip(network.maps, coarse.maps, strict=True):
                 mean += doubled(other, *mean.shape[1:])
@@ -154,8 +153,6 @@ class PosteriorDepth:
         if isinstance(data, PhotonCounts) and self.sheets.sweeps > 0:
             sheets = cut_sheets(posterior, total_px, total_disparity_px(data.grid, z_mm), self.sheets)
             if sheets.probability.any():
-                from pcii.depth.explained_views import explain_posterior
-
                 posterior = explain_posterior(data, posterior, sheets, self.sheets)
         return replace(posterior, in_focus=posterior.in_focus[order])
 

@@ -7,10 +7,12 @@ photon predicted by the others (the likelihood of leave-one-out).
 
 import numpy as np
 
-from pcii.base import block_sums
-from pcii.depth.sheet_kernels import level_likelihoods, mix_levels
+from pcii.base import block_sums, compiled
 from pcii.depth.sheets import SheetModel
 from pcii.evidence import doubled, gaussian_mean, gaussian_weights
+
+LEAST_LEFT = np.float32(0.05)
+"""Share of a texture that is left of it without the photon that it is to predict."""
 
 
 def textures(
@@ -34,10 +36,10 @@ def textures(
     levels = _levels(weighted, mean, samples, model)
     for octave, level in enumerate(levels):
         rate[octave], share[octave] = level[:Q], level[Q] * weight
-        block_nats = level_likelihoods(weighted, rate[octave], share[octave], samples)
+        block_nats = _level_likelihoods(weighted, rate[octave], share[octave], samples)
         nats[octave] = gaussian_mean(block_nats, gaussian_weights(model.window_blocks, 3))
     nats *= np.float32(2 * np.pi * model.window_blocks**2)
-    return mix_levels(nats, rate, share, samples)
+    return _mix_levels(nats, rate, share, samples)
 
 
 def smooth_texture(
@@ -73,3 +75,48 @@ def _levels(
             level = doubled(level, shape[1], shape[2])
         levels.append(level)
     return levels
+
+
+@compiled
+def _level_likelihoods(
+    sums: np.ndarray, rate: np.ndarray, share: np.ndarray, samples: np.ndarray
+) -> np.ndarray:
+    """The log-likelihood (h, w) of the photons of each block, each predicted by the others.
+
+    `sums` (Q + 1, h, w) are weighted photons and exposures, `rate` (Q, h, w) a texture, `share` (h, w) the
+    share of one photon in it times the samples (Q,).
+    """
+    Q, h, w = rate.shape
+    nats = np.zeros((h, w), np.float32)
+    for i in range(h):
+        for j in range(w):
+            for q in range(Q):
+                texture = rate[q, i, j]
+                nats[i, j] -= sums[Q, i, j] * samples[q] * texture
+                if sums[q, i, j] > 0:
+                    others = max(texture - share[i, j] / samples[q], texture * LEAST_LEFT)
+                    nats[i, j] += sums[q, i, j] * np.log(others)
+    return nats
+
+
+@compiled
+def _mix_levels(
+    nats: np.ndarray, rate: np.ndarray, share: np.ndarray, samples: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Means of textures (K, Q, h, w), and of shares (K, h, w), by how likely (K, h, w) each is: (Q, h, w)."""
+    K, Q, h, w = rate.shape
+    texture, photon_share = np.zeros((Q, h, w), np.float32), np.zeros((Q, h, w), np.float32)
+    weight = np.empty(K, np.float32)
+    for i in range(h):
+        for j in range(w):
+            most, total = nats[0, i, j], np.float32(0)
+            for k in range(1, K):
+                most = max(most, nats[k, i, j])
+            for k in range(K):
+                weight[k] = np.exp(nats[k, i, j] - most)
+                total += weight[k]
+            for k in range(K):
+                for q in range(Q):
+                    texture[q, i, j] += weight[k] / total * rate[k, q, i, j]
+                    photon_share[q, i, j] += weight[k] / total * share[k, i, j] / samples[q]
+    return texture, photon_share

@@ -5,11 +5,12 @@ is there. Masks are of sheets and not of what is seen: from near to far, a sheet
 nothing nearer is. Arrays: L sheets, h x w blocks, R requested planes; depths in px of total disparity.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from pcii.base import helper, shared
 from pcii.types import DepthPosterior
 
 
@@ -95,8 +96,6 @@ def cut_sheets(
     They are connected parts of smooth depth, those at the same depth in one; and flat ones at the requested
     planes (R,) at which there is none. There may be none at all.
     """
-    from pcii.depth.sheet_kernels import share_planes
-
     block_px = posterior.block_px
     same_px = model.same_blocks * block_px
     # A surface is more probable than none.
@@ -112,7 +111,7 @@ def cut_sheets(
     is_at = np.abs(np.subtract.outer(requested_px, middle_px)) < same_px
     probability = np.zeros(shape, np.float32)
     planes_px = posterior.planes.total_disparity_px
-    share_planes(probability, posterior.probability, planes_px, total, same_px)
+    _share_planes(probability, posterior.probability, planes_px, total, same_px)
     # An object in focus is a surface, also where the network does not know its depth.
     claimed = np.zeros(shape, np.float32)
     for in_focus, members in zip(posterior.in_focus, is_at, strict=True):
@@ -174,3 +173,113 @@ def _continued(total_px: np.ndarray, part: np.ndarray, sigma: float) -> np.ndarr
 
     nearest: Any = distance_transform_edt(~part, return_distances=False, return_indices=True)
     return gaussian_filter(total_px[tuple(nearest)].astype(np.float32), sigma, mode="nearest")
+
+
+def posterior_after(
+    posterior: DepthPosterior, sheets: Sheets, before: np.ndarray, after: np.ndarray, least: float
+) -> DepthPosterior:
+    """The posterior whose planes near a sheet grow by the root of how much more it is seen.
+
+    Probabilities (L, h, w) that each sheet is what is seen are `before` by the network alone and `after` by
+    the photons. No surface and planes far from all sheets grow with the light without depth. Where the
+    photons around do not tell the depth the network's stays. The probability of being in focus at a requested
+    plane grows by as much as the sheets at the plane do, that of no plane by as much as the others and the
+    light without depth. Where nothing changes the posterior does not either.
+    """
+    before, after = (_with_nothing(visible) for visible in (before, after))
+    growth = _by_depth(sheets, after, least) / _by_depth(sheets, before, least)
+    in_focus = _in_focus_after(posterior.in_focus, sheets, before, growth)
+    probability, no_surface = posterior.probability.copy(), posterior.no_surface.copy()
+    planes_px = posterior.planes.total_disparity_px
+    # The network's planes know the same photons already, so that what sheets say of them counts half.
+    _grow_planes(probability, no_surface, planes_px, sheets.total_px, sheets.same_px, np.sqrt(growth))
+    is_supported = posterior.is_supported
+    probability = np.where(is_supported, probability, posterior.probability)
+    no_surface = np.where(is_supported, no_surface, posterior.no_surface)
+    return replace(posterior, probability=probability, no_surface=no_surface, in_focus=in_focus)
+
+
+def _with_nothing(visible: np.ndarray) -> np.ndarray:
+    """The probabilities (L + 1, h, w) of sheets (L, h, w), and of the light without depth."""
+    return np.concatenate([visible, 1 - visible.sum(axis=0, keepdims=True)])
+
+
+def _by_depth(sheets: Sheets, visible: np.ndarray, least: float) -> np.ndarray:
+    """The probability (L + 1, h, w) that a sheet, or another at its depth, is what is seen, more by `least`;
+    and of the light without depth."""
+    depths, same_px = sheets.total_px, sheets.same_px
+    near = [(visible[:-1] * (np.abs(depths - depth) < same_px)).sum(axis=0) for depth in depths]
+    return np.stack([*near, visible[-1]]) + np.float32(least)
+
+
+def _in_focus_after(
+    in_focus: np.ndarray, sheets: Sheets, before: np.ndarray, growth: np.ndarray
+) -> np.ndarray:
+    """Probabilities (R, h, w) of being in focus, each times the mean `growth` of its sheets, normalised."""
+    weight = before + np.finfo(np.float32).eps
+    # The sheets of each requested plane, then those of no plane and the light without depth.
+    members = [np.append(is_at_plane, False) for is_at_plane in sheets.is_at]
+    members.append(np.append(~sheets.is_at.any(axis=0), True))
+    claimed = np.concatenate([in_focus, (1 - in_focus.sum(axis=0, keepdims=True)).clip(0)])
+    for probability, member in zip(claimed, members, strict=True):
+        probability *= (weight[member] * growth[member]).sum(axis=0) / weight[member].sum(axis=0)
+    return claimed[:-1] / claimed.sum(axis=0)
+
+
+@helper
+def _nearest_sheet(total_px: np.ndarray, i: int, j: int, plane_px: float, near_px: float) -> int:
+    """The sheet of total_px (L, h, w) nearest to a plane at a block; L if none is nearer than `near_px`."""
+    nearest, distance = len(total_px), np.float32(near_px)
+    for sheet in range(len(total_px)):
+        away = abs(total_px[sheet, i, j] - plane_px)
+        if away < distance:
+            nearest, distance = sheet, away
+    return nearest
+
+
+@shared(lambda probability, *_: probability.shape[1])
+def _share_planes(
+    first: int,
+    last: int,
+    probability: np.ndarray,
+    planes: np.ndarray,
+    planes_px: np.ndarray,
+    total_px: np.ndarray,
+    near_px: float,
+) -> None:
+    """Add the planes (Z, h, w) of a posterior to the `probability` (L, h, w) of the sheet near them."""
+    for i in range(first, last):
+        for z in range(len(planes)):
+            for j in range(probability.shape[2]):
+                nearest = _nearest_sheet(total_px, i, j, planes_px[z], near_px)
+                if nearest < len(total_px):
+                    probability[nearest, i, j] += planes[z, i, j]
+
+
+@shared(lambda probability, *_: probability.shape[1])
+def _grow_planes(
+    first: int,
+    last: int,
+    probability: np.ndarray,
+    no_surface: np.ndarray,
+    planes_px: np.ndarray,
+    total_px: np.ndarray,
+    near_px: float,
+    growth: np.ndarray,
+) -> None:
+    """Multiply the `probability` (Z, h, w) of planes near a sheet, and that of `no_surface` (h, w), by how
+    many times more (L + 1, h, w) the sheet is seen, and the light without depth is; normalised."""
+    Z, _, w = probability.shape
+    L = len(total_px)
+    for i in range(first, last):
+        for j in range(w):
+            no_surface[i, j] *= growth[L, i, j]
+        total = no_surface[i].copy()
+        for z in range(Z):
+            for j in range(w):
+                nearest = _nearest_sheet(total_px, i, j, planes_px[z], near_px)
+                probability[z, i, j] *= growth[nearest, i, j]
+                total[j] += probability[z, i, j]
+        for j in range(w):
+            no_surface[i, j] /= total[j]
+            probability[:, i, j] /= total[j]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from pcii.base import each_in_threads, threads
 from pcii.depth.network_inputs import NETWORK_CELL_BLOCKS, NetworkInputs
 
 if TYPE_CHECKING:
@@ -54,8 +55,6 @@ def run_network(inputs: NetworkInputs, requested_planes: np.ndarray) -> NetworkO
     first, 1.5 lies between the second and the third. `inputs.hint` holds the same request.
     """
     import onnxruntime
-
-    from pcii.base import each_in_threads, threads
 
     trunk, head = _sessions(WEIGHTS, threads())
     options = onnxruntime.RunOptions()
@@ -149,35 +148,23 @@ def _focus(relative: np.ndarray, some: np.ndarray, mask: np.ndarray, weights: np
     return softmax(logits, axis=0)[:-1]
 
 
-def depth_prior(Z: int, requested_planes: np.ndarray) -> np.ndarray:
-    """How probable a surface at each of Z planes is without any photon, relative to planes that nobody
-    requests: (Z,) float32. The request says that objects are near these planes; NaN requests nothing.
+def requested_weights(Z: int, requested_planes: np.ndarray) -> np.ndarray:
+    """Weights (R + 1, Z) float32 of the probabilities of planes without a request; NaN requests nothing.
+
+    The last row is how probable a surface at each plane is without any photon, relative to planes that nobody
+    requests: the request says that objects are near these planes. Its weighted sum is that of all planes with
+    the request, and each other row's, divided by it, is how probable a surface near a requested plane is. A
+    plane is near the closest requested one, if within `FOCUS_PLANES`.
     """
     offset = np.arange(Z) - requested_planes[:, None]
     bumps = np.exp(-((offset / REQUESTED_SIGMA) ** 2) / 2)
-    return (1 + REQUESTED_GAIN * np.nansum(bumps, axis=0)).astype(np.float32)
-
-
-def requested_weights(Z: int, requested_planes: np.ndarray) -> np.ndarray:
-    """Weights (R + 1, Z) float32 of the probabilities of planes without a request.
-
-    The weighted sum of the last row is that of all planes with the request, and each other row's, divided by
-    it, is how probable a surface near a requested plane is. NaN requests nothing.
-    """
-    prior = depth_prior(Z, requested_planes)
-    return np.concatenate([near_requested(Z, requested_planes) * prior, prior[None]])
-
-
-def near_requested(Z: int, requested_planes: np.ndarray) -> np.ndarray:
-    """Which of Z planes are near each requested one: (R, Z) float32, 0 or 1.
-
-    A plane is near the closest requested one, if within `FOCUS_PLANES`; NaN requests nothing.
-    """
+    prior = (1 + REQUESTED_GAIN * np.nansum(bumps, axis=0)).astype(np.float32)[None]
     if requested_planes.size == 0:
-        return np.zeros((0, Z), np.float32)
-    distance = np.abs(np.arange(Z) - np.nan_to_num(requested_planes, nan=np.inf)[:, None])
+        return prior
+    distance = np.abs(np.nan_to_num(offset, nan=np.inf))
     is_closest = distance.argmin(axis=0) == np.arange(requested_planes.size)[:, None]
-    return (is_closest & (distance <= FOCUS_PLANES)).astype(np.float32)
+    is_near = is_closest & (distance <= FOCUS_PLANES)
+    return np.concatenate([is_near * prior, prior])
 
 
 @cache

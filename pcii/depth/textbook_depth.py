@@ -145,28 +145,18 @@ def _swept(
             nearby[:, better] = np.stack([last, current, nothing])[:, better]
             best[better] = plane
             last, least = current, np.minimum(least, current)
-    # Where all planes are alike there is nothing to choose from.
-    depth = np.where(nearby[1] > least, _peak_depth_mm(planes, best, nearby), np.nan)
-    depth = on_pixels(depth, side, data.grid.shape_HW)
-    return DepthMap(depth, np.isfinite(depth).astype(np.float64))
-
-
-def _peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:
-    """Depth (h, w) in mm of the top of a parabola through the `best` plane (h, w) and its neighbours.
-
-    `nearby` (3, h, w) is a measure at the plane before, at it and after it: larger the better the plane, and
-    not finite beyond the ends. Total disparities of the planes are evenly spaced. The depth stays within half
-    a step of the best plane.
-    """
-    total_px = planes.total_disparity_px
-    before, at, after = nearby
-    inner = np.isfinite(nearby).all(axis=0)
+    # The top of a parabola through the best plane and two neighbours, at most half a step away.
+    inner, (before, at, after) = np.isfinite(nearby).all(axis=0), nearby
     with np.errstate(invalid="ignore"):
         curvature = np.where(inner, before - 2 * at + after, 0.0)
         slope = np.where(inner, before - after, 0.0)
     offset = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
-    step_px = total_px[1] - total_px[0]
-    return depth_of_total_disparity_mm(planes.grid, total_px[best] + np.clip(offset, -0.5, 0.5) * step_px)
+    total_px = planes.total_disparity_px
+    best_px = total_px[best] + np.clip(offset, -0.5, 0.5) * (total_px[1] - total_px[0])
+    # Where all planes are alike there is nothing to choose from.
+    depth = np.where(nearby[1] > least, depth_of_total_disparity_mm(planes.grid, best_px), np.nan)
+    depth = on_pixels(depth, side, data.grid.shape_HW)
+    return DepthMap(depth, np.isfinite(depth).astype(np.float64))
 
 
 def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:
@@ -188,32 +178,27 @@ def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:
     return DepthMap(depth_of_total_disparity_mm(grid, np.clip(best_px, *ends_px)), best_coherence)
 
 
-Line = list[tuple[int, int, np.ndarray]]
-"""Images (H, W) of a row or column of cameras, each with its (k, l)."""
+def _cross(data: Views) -> list[tuple[int, list[tuple[int, int, np.ndarray]]]]:
+    """The middle rows and columns of cameras, each with the axis of its disparity: (k, l) and view (H, W).
 
-
-def _cross(data: Views) -> list[tuple[int, Line]]:
-    """The middle rows and columns of cameras, smoothed, each with the axis of its disparity."""
-    K, L = data.grid.rows, data.grid.cols
-    scale = binary_scale(data)
-    places = [(1, [(k, l) for l in range(L)]) for k in _middle(K) if L > 1]
-    places += [(0, [(k, l) for k in range(K)]) for l in _middle(L) if K > 1]
-    return [(axis, [(k, l, _grey(data, k, l, scale)) for k, l in line]) for axis, line in places]
-
-
-def _middle(number: int) -> range:
-    """The middle row (or column) of cameras, or both middle ones."""
-    return range((number - 1) // 2, number // 2 + 1)
-
-
-def _grey(data: Views, k: int, l: int, scale: float) -> np.ndarray:
-    """One view (H, W) without colours, smoothed, in units of `scale`."""
+    Views have no colours and are smoothed, in units of `binary_scale`.
+    """
     from scipy.ndimage import gaussian_filter
 
-    image = data.view(k, l).astype(np.float64) / scale
-    if data.cfa is not None:
-        image = demosaic(image[..., 0], cfa=data.cfa)
-    return gaussian_filter(image.mean(axis=-1), INNER_SIGMA_PX)
+    K, L = data.grid.rows, data.grid.cols
+    scale = binary_scale(data)
+
+    def grey(k: int, l: int) -> np.ndarray:
+        image = data.view(k, l).astype(np.float64) / scale
+        if data.cfa is not None:
+            image = demosaic(image[..., 0], cfa=data.cfa)
+        return gaussian_filter(image.mean(axis=-1), INNER_SIGMA_PX)
+
+    # The middle one, or both middle ones.
+    rows, cols = (range((number - 1) // 2, number // 2 + 1) for number in (K, L))
+    places = [(1, [(k, l) for l in range(L)]) for k in rows if L > 1]
+    places += [(0, [(k, l) for k in range(K)]) for l in cols if K > 1]
+    return [(axis, [(k, l, grey(k, l)) for k, l in line]) for axis, line in places]
 
 
 def _gradient(stack: np.ndarray, axis: int) -> np.ndarray:
@@ -221,7 +206,7 @@ def _gradient(stack: np.ndarray, axis: int) -> np.ndarray:
     return np.gradient(stack, axis=axis) if stack.shape[axis] > 1 else np.zeros_like(stack)
 
 
-def _slope(lines: list[tuple[int, Line]], plane: FocalPlanes) -> tuple[np.ndarray, np.ndarray]:
+def _slope(lines: list[tuple[int, list]], plane: FocalPlanes) -> tuple[np.ndarray, np.ndarray]:
     """Slope (H, W) in px per camera of the longer axis, of views refocused at a plane; and its coherence."""
     from scipy.ndimage import gaussian_filter, shift
 

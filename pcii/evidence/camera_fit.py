@@ -29,10 +29,8 @@ from pcii.types import (
 # What limits the work. More is slower; fewer cells place depths less exactly.
 MAX_CAMERAS = 5
 """Largest number of camera rows, and of columns, that are used: first, last, and equally spread between."""
-COARSE_CELLS, FINE_CELLS = 128, 512
-"""Largest side of the views in cells, to try orders and to place depths."""
-MAX_PEAKS = 4
-"""Largest number of depths: as many as a report has room for."""
+MAX_CELLS = 128
+"""Largest side of the views in cells, to try orders; depths are placed by cells of a quarter of the size."""
 RANGE_FACTOR = 4.0
 """How far beyond a stated range depths are looked at, as a factor of parallax: ranges are stated roughly."""
 
@@ -42,26 +40,24 @@ PHOTONS_PER_CELL = 4.0
 BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0
 """Standard deviations of the band that views are limited to: half cells do not matter, nor vignetting."""
 WINDOW_CELLS, MIN_SHARE = 5, 0.6
-"""Side of the window over which the variance is averaged; share of the views that have to reach a cell, and
-of the cells that have to be reached in a window: more than half."""
-MIN_CELLS = 16
-"""Smallest side of views that are judged: three windows."""
+"""Side of the window over which the variance is averaged, a third of the smallest side of views that are
+judged; share of the views that have to reach a cell, and of the cells that have to be reached in a window:
+more than half."""
 
-# What decides, set by hand so that right views are not warned about and wrong ones are, as
-# tests/pcii/evidence/test_camera_fit.py keeps it. If a share of the variance is larger, noise decides.
+# What decides. If a share of the variance is larger, noise decides; if smaller, wrong views pass, as
+# tests/pcii/evidence/test_camera_fit.py keeps it.
 BETTER = 0.75
 """An order is better than others if at most this share of their variance remains."""
-SHARP, MIN_SHARP = 0.5, 0.02
-"""At a surface the variance is at most this share of its mean over the planes; least share of such cells. If
-the latter is smaller, noise is taken for surfaces; if larger, small things are not seen."""
-MIN_PEAK_SHARE = 0.08
-"""Least share of all sharp cells that lie around a reported depth. If it is smaller, chance makes depths; if
+SHARP = 0.5
+"""At a surface the variance is at most this share of its mean over the planes."""
+CHANCE_SHARE = 0.02
+"""Share of the cells that are sharp by chance, and of what is sharp that chance puts behind a shear.
+If it is smaller, noise is taken for surfaces and single cells make the shear larger; if larger, small things
+are not seen."""
+MAX_DEPTHS, MIN_DEPTH_SHARE = 4, 0.08
+"""Of depths that are proposed, those that a report has room for; least share of all surfaces around one, and
+of what is sharp behind the cameras for a warning. If it is smaller, chance makes depths and warnings; if
 larger, small surfaces are left out."""
-MAX_BEHIND_SHARE = 0.12
-"""Largest share of what is sharp that may lie behind the cameras unwarned: chance puts some there."""
-LEFT_BEHIND_SHARE = 0.02
-"""Share of what is sharp that the advised shear leaves behind the cameras. If it is smaller, single cells
-that are sharp by chance make the shear larger."""
 
 
 @dataclass(frozen=True)
@@ -93,13 +89,13 @@ def check_grid(
     """
     if z_range_mm is not None:
         check_depth_range(z_range_mm)
-    grid, side = images.grid, _cell_side(images, COARSE_CELLS)
-    if grid.view_count < 2 or min(grid.height, grid.width) < MIN_CELLS * side:
+    grid, side = images.grid, _cell_side(images, MAX_CELLS)
+    if grid.view_count < 2 or min(grid.height, grid.width) < 3 * WINDOW_CELLS * side:
         return CameraFit()
     reach = float(max(grid.height, grid.width))
     if z_range_mm is not None:
         ends = total_disparity_px(grid, np.array(z_range_mm)) - _still_px(grid)
-        reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), MIN_CELLS / 2 * side))
+        reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), 1.5 * WINDOW_CELLS * side))
     shifts_px = side * np.arange(-np.ceil(reach / side), np.ceil(reach / side) + 1)
     cells = _cells_of(images, side)
     tables = _tables_of_orders(grid, order)
@@ -114,11 +110,11 @@ def check_grid(
     fit = CameraFit(nearest_mm=float(depth_of_total_disparity_mm(grid, nearest_px)))
     sharpness, is_sharp = _sharpness(variance)
     wrong = np.mean([value for one, value in remaining.items() if one != best])
-    if is_sharp.mean() < MIN_SHARP or remaining[best] > BETTER * wrong:
+    if is_sharp.mean() < CHANCE_SHARE or remaining[best] > BETTER * wrong:
         return fit
     fit = replace(fit, order=None if best == order else best)
     mass = _by_plane(variance, sharpness * is_sharp)
-    if mass[total_px < -side].sum() > MAX_BEHIND_SHARE:
+    if mass[total_px < -side].sum() > MIN_DEPTH_SHARE:
         return _in_front(fit, best, grids[best], mass, shifts_px, side)
     if fit.order is not None:
         return fit
@@ -132,10 +128,10 @@ def _in_front(
 ) -> CameraFit:
     """The fit of views in which much is sharp behind the cameras: the order or the shear that mends it."""
     is_behind = _still_px(grid) - shifts_px < -side  # of views whose two axes are turned
-    if mass[is_behind].sum() <= MAX_BEHIND_SHARE and not is_behind[_peaks(mass)].any():
+    if mass[is_behind].sum() <= MIN_DEPTH_SHARE and not is_behind[_peaks(mass)].any():
         rows, cols = order.flip_rows ^ (grid.rows > 1), order.flip_cols ^ (grid.cols > 1)
         return replace(fit, order=replace(order, flip_rows=rows, flip_cols=cols))
-    least_px = float(shifts_px[np.searchsorted(mass.cumsum(), LEFT_BEHIND_SHARE)])
+    least_px = float(shifts_px[np.searchsorted(mass.cumsum(), CHANCE_SHARE)])
     x, y = 2 * max(-least_px, 0.0) * parallax_per_total(grid)  # as far in front as it was behind
     return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
 
@@ -153,7 +149,7 @@ def _placed_mm(
     `coarse` are the variance (P, h, w) and whether cells are sharp (h, w), in cells of `side` px.
     """
     variance, is_sharp = coarse
-    fine = min(_cell_side(images, FINE_CELLS), side)
+    fine = min(_cell_side(images, 4 * MAX_CELLS), side)
     fine_cells = _cells_of(images, fine)
     for peak in peaks:
         near_px = shifts_px[peak] + np.arange(-2 * side, 2 * side + fine / 4, fine / 2)
@@ -291,5 +287,5 @@ def _peaks(mass: np.ndarray) -> list[int]:
     """Planes at which more is sharp than at their neighbours, those of most first."""
     padded = np.pad(mass, 1)
     around = padded[:-2] + padded[1:-1] + padded[2:]
-    is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= MIN_PEAK_SHARE)
-    return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MAX_PEAKS]
+    is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= MIN_DEPTH_SHARE)
+    return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MAX_DEPTHS]

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pcii.base import block_sums, on_pixels, window_sums
+from pcii.base import block_sums, each_in_threads, on_pixels, window_sums
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
 from pcii.types import FocalPlanes, PhotonCounts, Views, parallax_per_total
 
@@ -127,6 +127,4 @@ def _evidence_at(
 
 def _in_windows(nats: np.ndarray, sigma: float) -> np.ndarray:
     """Sums (Z, h, w) in the window around each cell."""
-    from pcii.base import each_in_threads
-
     return np.stack(each_in_threads(lambda z: window_sums(nats[z], sigma), range(len(nats))))

@@ -26,11 +26,11 @@ little evidence.
 
 from dataclasses import dataclass, replace
 from functools import cache, reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pcii.base import block_sums, sum_of
+from pcii.base import block_sums, compiled, each_in_threads, helper, sum_of
 from pcii.sections import reconstruct
 from pcii.types import FocalPlanes, PhotonCounts, Views, binary_scale
 
@@ -85,9 +85,6 @@ def evidence_of_texture(
     The sum over a window is the logarithm, but for a constant, of how likely its samples are if the surface
     is at this plane. A mosaic has all colours in a block of 2 pixels or more, for any shift.
     """
-    from pcii.base import each_in_threads
-    from pcii.evidence.octave_kernels import add_saturated
-
     planes = replace(planes, rounding=ROUNDING)
     texture_model = model or TextureModel()
     colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
@@ -114,12 +111,13 @@ def evidence_of_texture(
     largest = [reduce(np.maximum, each).clip(min=0) for each in zip(*octaves, strict=True)]
 
     def sum_octaves(plane: int) -> None:
-        total = np.empty((0, 0), np.float32)
-        for octave in reversed(range(texture_model.octaves)):
-            # The first two octaves have the same grid.
-            evidence, step = octaves[plane][octave], 2 if octave > 0 else 1
-            add_saturated(evidence, largest[octave], texture_model.saturation_nats, total, step)
-            total = evidence
+        total: Any = np.float32(-0.0)  # which changes nothing that it is added to
+        for octave, evidence in reversed([*enumerate(octaves[plane])]):
+            reduction = 1 + largest[octave] / np.float32(texture_model.saturation_nats)
+            evidence = np.where(evidence > 0, evidence / reduction, evidence)
+            if 0 < octave < texture_model.octaves - 1:  # the first two octaves have the same grid
+                total = doubled(total[None], *evidence.shape)[0]
+            total = evidence + np.float32(0.25) * total
         nats[plane] = total[:h, :w]
 
     each_in_threads(sum_octaves, range(len(planes)))
@@ -162,8 +160,6 @@ def _of_section(
     """The e of each octave on its own grid, from the values of `_block_sums` and `_samples_of_blocks`."""
     from scipy.ndimage import gaussian_filter1d
 
-    from pcii.evidence.octave_kernels import gaussian_mean, gaussian_weights, octave_evidence
-
     excess = list[np.ndarray]()
     for octave in range(model.octaves):
         if octave > 1:
@@ -174,7 +170,7 @@ def _of_section(
         number = tuple(gaussian_filter1d(part, _blur(octave), mode="constant") for part in number)
         coefficients = _noise_weight(octave), model.averaging_error, model.contrast
         constants = np.array([*coefficients, least_samples, LEAST_SAMPLES, LEAST_RATE], np.float32)
-        excess.append(octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))
+        excess.append(_octave_evidence(finer, (blocks[0], *number), blocks[-1], constants))
     return excess
 
 
@@ -207,3 +203,93 @@ def _noise_weight(octave: int) -> float:
     coarser_mean = gaussian_filter1d(finer_mean, _blur(octave), axis=0, mode="constant")
     a, b = finer_mean[finer_mean.shape[0] // 2], coarser_mean[finer_mean.shape[0] // 2]
     return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)
+
+
+# Compiled, in single precision: loops along rows, of which the compiler takes several blocks at a time.
+
+
+@compiled
+def gaussian_mean(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Means of `values` (h, w) float32, 0 beyond the borders, by Gaussian weights along either axis.
+
+    `weight` (R + 1,) float32 are those of the blocks 0 to R away.
+    """
+    h, w = values.shape
+    reach = weight.size - 1
+    result, dark = np.zeros((h, w), np.float32), np.zeros(w, np.float32)
+    line = np.zeros(w + 2 * reach, np.float32)
+    for i in range(h):
+        middle = line[reach : reach + w]
+        middle[:] = 0
+        for r in range(reach + 1):
+            above = values[i - r] if i >= r else dark
+            below = values[i + r] if 0 < r < h - i else dark
+            _add_pair(middle, above, below, weight[r])
+        for r in range(reach + 1):
+            right = line[reach + r : reach + r + w] if r > 0 else dark
+            _add_pair(result[i], line[reach - r : reach - r + w], right, weight[r])
+    return result
+
+
+@cache
+def gaussian_weights(sigma: float, deviations: int) -> np.ndarray:
+    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian, up to so many standard deviations."""
+    distance = np.arange(int(deviations * sigma + 0.5) + 1)
+    weight = np.exp(-((distance / sigma) ** 2) / 2)
+    return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)
+
+
+@helper
+def _add_pair(total: np.ndarray, one: np.ndarray, other: np.ndarray, weight: float) -> None:
+    # Of slices, so that the compiler sees that neighbours exist and takes several at a time.
+    for j in range(total.size):
+        total[j] += weight * (one[j] + other[j])
+
+
+@compiled
+def doubled(coarse: np.ndarray, h: int, w: int) -> np.ndarray:
+    """Maps (C, h, w) float32 of blocks half as large as those of `coarse`, interpolated between the centres
+    and continued beyond the borders."""
+    C, rows, cols = coarse.shape
+    fine, line = np.empty((C, h, w), np.float32), np.empty(cols, np.float32)
+    three, sixteenth = np.float32(3), np.float32(1 / 16)
+    for c in range(C):
+        for i in range(h):
+            neighbour = min(i // 2 + 1, rows - 1) if i % 2 else max(i // 2 - 1, 0)
+            line[:] = (three * coarse[c, i // 2] + coarse[c, neighbour]) * sixteenth
+            row = fine[c, i]
+            for b in range((w + 1) // 2):
+                row[2 * b] = three * line[b] + line[max(b - 1, 0)]
+                if 2 * b + 1 < w:
+                    row[2 * b + 1] = three * line[b] + line[min(b + 1, cols - 1)]
+    return fine
+
+
+@compiled
+def _octave_evidence(
+    finer: tuple[np.ndarray, ...], coarser: tuple[np.ndarray, ...], spread: np.ndarray, constants: np.ndarray
+) -> np.ndarray:
+    """The e (h, w) float32 of coefficients, the difference of two means of blocks.
+
+    `finer` and `coarser` are the sum (h, w) and the number of samples, the product of that of a row (h,) and
+    of a column (w,); `spread` (h, w) is the variance of the coarser sum. `constants` float32 are the weight
+    of the noise, a, c, the least number of samples that counts, and the least samples and rate to divide by.
+    """
+    weight, averaging_error, contrast, least_counted, least_samples, least_rate = constants
+    result = np.empty(spread.shape, np.float32)
+    half, one, zero = np.float32(0.5), np.float32(1), np.float32(0)
+    fine_samples, samples = finer[2], coarser[2]
+    for i in range(spread.shape[0]):
+        fine_row, row, spread_row, line = finer[0][i], coarser[0][i], spread[i], result[i]
+        fine_share, share = finer[1][i], coarser[1][i]
+        for j in range(line.size):
+            number = max(share * samples[j], least_samples)
+            around = row[j] / number
+            difference = fine_row[j] / max(fine_share * fine_samples[j], least_samples) - around
+            left, texture = averaging_error * around, contrast * around
+            noise = weight * max(spread_row[j], zero) / (number * number)
+            noise = max(noise, least_rate * least_rate) + left * left
+            texture *= texture
+            excess = texture / (noise + texture) * (difference * difference / noise - one) * half
+            line[j] = excess if share * samples[j] >= least_counted else zero
+    return result

@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base import InputError
+from pcii.base import InputError, helper, shared
 from pcii.types import FocalPlanes, PhotonCounts, Shifts, Views, colour_cells
 
+BAND = 16
+"""Rows of a section that images are added to at a time: their sums stay in the cache."""
 BATCH = 8
 """Views that are read from disk at a time; as many are added meanwhile."""
 MOST_BYTES = 1 << 31
@@ -32,17 +34,15 @@ def sum_views(
     A view is read once, however many planes. A voxel below two samples has the variance 0.
     Raises `InputError` for radiance that is NaN or infinite, or whose sums or variances would be.
     """
-    from pcii.sections import kernels
-
     kind, images = _dtype(data), _as_one_array(data)
     running = (_RunningSums(data, focal_planes.take([p]), shifts, variance) for p in range(len(focal_planes)))
     if images is not None:  # plane by plane, so that the running sums of one are in memory
-        _check_finite(data, all(kernels.are_finite(images)))
+        _check_finite(data, all(_are_finite(images)))
         sections = [sums.add(np.arange(len(images)), images).merged(kind) for sums in running]
     else:
         planes = list(running)
         for views, batch in _batches(data):
-            _check_finite(data, all(kernels.are_finite(batch)))
+            _check_finite(data, all(_are_finite(batch)))
             for plane in planes:
                 plane.add(views, batch)
         sections = [plane.merged(kind) for plane in planes]
@@ -65,31 +65,13 @@ def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) ->
     return _stacked([sums.add(np.arange(len(images)), images).merged(np.int64)[0] for sums in running])
 
 
-def sum_fine(data: Views, rows: np.ndarray, cols: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Sums (Z, H M, W M, C), float64, of radiance on finer voxels.
-
-    `rows` (Z, K, H) and `cols` (Z, L, W) are `FocalPlanes.voxel_indices`, which send no two pixels of a view
-    to the same voxel. A view is read once, however many planes. Raises `InputError` for radiance that is NaN
-    or infinite, or whose sums would be.
-    """
-    from pcii.sections import kernels
-
-    total, cells = np.zeros(shape), np.zeros((0, 2), np.int64) if data.cfa is None else colour_cells(data.cfa)
-    for k, l in np.ndindex(data.grid.rows, data.grid.cols):
-        image = data.view(k, l).astype(np.float64)
-        for section, row_of, col_of in zip(total, rows[:, k], cols[:, l], strict=True):
-            kernels.add_fine(section, image, row_of, col_of, cells)
-    _check_finite(data, bool(np.isfinite(total).all()))
-    return total
-
-
 def _stacked(planes: list[np.ndarray]) -> np.ndarray:
     """Planes as one array; a single one without copying it."""
     return np.stack(planes) if len(planes) > 1 else planes[0][None]
 
 
 class _RunningSums:
-    """The section at one plane while views are added: total, squares and first samples of `kernels`."""
+    """The section at one plane while views are added: total, squares and first samples of `_add_views`."""
 
     def __init__(
         self, data: Views | PhotonCounts, plane: FocalPlanes, shifts: Shifts, variance: bool
@@ -108,8 +90,6 @@ class _RunningSums:
 
         Group 2 p + q of mosaics has the views whose row and column shifts have the parities p and q.
         """
-        from pcii.sections import kernels
-
         down, right = self.row_px[views // self.grid.cols], self.col_px[views % self.grid.cols]
         group = np.zeros_like(down) if self.cells is None else 2 * (down % 2) + right % 2
         # The images that move least cover most of a section, so they come first.
@@ -118,7 +98,7 @@ class _RunningSums:
         channels = self.colours if self.cells is None else 1
         moves = order, down[order], right[order] * channels, ends
         total, squares, first = self.sums if len(self.sums) == 3 else (self.sums[0], None, None)
-        kernels.add_views(total, squares, first, images, moves)
+        _add_views(total, squares, first, images, moves)
         return self
 
     def merged(self, kind: Any) -> tuple[np.ndarray, np.ndarray | None]:
@@ -245,3 +225,134 @@ def _cameras_by_parity(shift: np.ndarray, size: int) -> np.ndarray:
     pixel = np.arange(size) - shift[:, None]
     inside = (pixel >= 0) & (pixel < size)
     return np.array([inside[shift % 2 == parity].sum(axis=0) for parity in (0, 1)])
+
+
+@shared(lambda images: len(images))
+def _are_finite(first: int, last: int, images: np.ndarray) -> bool:
+    """Whether no pixel of images (V, H, N) is NaN or infinite."""
+    bad = 0
+    for view in range(first, last):
+        for row in range(images.shape[1]):
+            for x in range(images.shape[2]):
+                bad += not np.isfinite(images[view, row, x])
+    return bad == 0
+
+
+@shared(lambda total, *_: -(-total.shape[1] // BAND))
+def _add_views(
+    first_band: int,
+    last_band: int,
+    total: np.ndarray,
+    squares: np.ndarray | None,
+    first: np.ndarray | None,
+    images: np.ndarray,
+    moves: tuple[np.ndarray, ...],
+) -> None:
+    """Add images (V, H, N), N columns times channels, to running sums of groups of them, (G, H, N) float64.
+
+    If variances are wanted, `total` has sums of differences from the `first` sample, which is NaN where there
+    is none yet, and `squares` those of these differences squared; else `total` has sums of the samples and
+    the other two are None: what is done with them is not compiled. `moves` are four arrays: the images (M,)
+    in the order in which they are added, group after group; by how many rows (M,) and by how many columns
+    times channels (M,) each is moved; and where each group ends (G,). The rows of an image are read in the
+    order in which they lie in memory.
+    """
+    _, height, width = images.shape
+    source, row_shift, col_shift, ends = moves
+    for band in range(first_band, last_band):
+        top, bottom = band * BAND, min((band + 1) * BAND, height)
+        begin = 0
+        for g in range(ends.size):
+            if first is not None:
+                for row in range(top, bottom):
+                    _find_first(first[g, row], images, row, moves, begin, ends[g])
+            for m in range(begin, ends[g], 4):
+                four = np.arange(m, min(m + 4, ends[g]))
+                for row in range(top, bottom):
+                    if squares is not None and first is not None:
+                        running_row = total[g, row], squares[g, row], first[g, row]
+                        _add_deviations_of_four(running_row, images, row, moves, four)
+                        continue
+                    for n in four:
+                        at, shift = row - row_shift[n], col_shift[n]
+                        low, high = max(0, shift), min(width, width + shift)
+                        if 0 <= at < height and low < high:
+                            _add(total[g, row, low:high], images[source[n], at, low - shift : high - shift])
+            begin = ends[g]
+
+
+@helper
+def _find_first(first, images, row, moves, from_move, to_move) -> None:
+    """Set `first` to the first sample of each voxel of a row that has none yet."""
+    _, height, width = images.shape
+    source, row_shift, col_shift, _ = moves
+    begin = end = 0  # the run of voxels that are known to have one
+    for m in range(from_move, to_move):
+        at, shift = row - row_shift[m], col_shift[m]
+        low, high = max(0, shift), min(width, width + shift)
+        if at < 0 or at >= height or low >= high:
+            continue
+        values = images[source[m], at]
+        if begin == end or low > end or high < begin:
+            _fill(first, values, shift, low, high)
+            if begin == end:
+                begin, end = low, high
+            continue
+        _fill(first, values, shift, low, begin)
+        _fill(first, values, shift, end, high)
+        begin, end = min(begin, low), max(end, high)
+
+
+@helper
+def _fill(first, values, shift, low, high) -> None:
+    for x in range(low, high):
+        first[x] = first[x] if first[x] == first[x] else values[x - shift]
+
+
+@helper
+def _add(total, values) -> None:
+    for x in range(total.size):
+        total[x] += values[x]
+
+
+@helper
+def _add_deviations(running_row, values, shift, start, stop) -> None:
+    """Add one image's row, moved by `shift`, to the running sums of the voxels `start` to `stop` of a row."""
+    total, squares, first = running_row
+    low, high = max(start, shift, 0), min(stop, values.size + shift, values.size)
+    for x in range(low, high):
+        difference = values[x - shift] - first[x]
+        total[x] += difference
+        squares[x] += difference * difference
+
+
+@helper
+def _add_deviations_of_four(running_row, images, row, moves, four) -> None:
+    """Add the rows of up to four images, in one pass where all have samples: sums are loaded less often."""
+    total, squares, first = running_row
+    source, row_shift, col_shift, _ = moves
+    _, height, width = images.shape
+    low, high, reaching = 0, width, 0
+    for m in four:
+        low, high = max(low, col_shift[m]), min(high, width + col_shift[m])
+        reaching += 0 <= row - row_shift[m] < height
+    if reaching < 4 or low >= high:
+        low = high = width
+    for m in four:
+        at = row - row_shift[m]
+        if 0 <= at < height:
+            values = images[source[m], at]
+            _add_deviations(running_row, values, col_shift[m], 0, low)
+            _add_deviations(running_row, values, col_shift[m], high, width)
+    if low >= high:
+        return
+    m, n, o, p = four[0], four[1], four[2], four[3]
+    a = images[source[m], row - row_shift[m], low - col_shift[m] : high - col_shift[m]]
+    b = images[source[n], row - row_shift[n], low - col_shift[n] : high - col_shift[n]]
+    c = images[source[o], row - row_shift[o], low - col_shift[o] : high - col_shift[o]]
+    d = images[source[p], row - row_shift[p], low - col_shift[p] : high - col_shift[p]]
+    total, squares, first = total[low:high], squares[low:high], first[low:high]
+    for x in range(high - low):
+        s, t, u, v = a[x] - first[x], b[x] - first[x], c[x] - first[x], d[x] - first[x]
+        total[x] += (s + t) + (u + v)
+        squares[x] += (s * s + t * t) + (u * u + v * v)

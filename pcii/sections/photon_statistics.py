@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.base import sum_of
+from pcii.base import shared, sum_of, threads
 from pcii.types import NEGLIGIBLE_LOSS, FocalPlanes, PhotonCounts, Readout, Sections, Views, colour_index
 
 GREY_LEVELS = 256
@@ -154,9 +154,6 @@ def view_samples(
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
     """
-    from pcii.base import threads
-    from pcii.sections import kernels
-
     grid, events = counts.grid, counts.events
     row, col, inside = planes.project(events, plane)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
@@ -165,12 +162,60 @@ def view_samples(
     # Events are sorted by view.
     starts = np.append(0, np.cumsum(inside))[counts.view_starts]
     cells = row[inside] // cell_px, col[inside] // cell_px
-    samples = kernels.Samples(number, first, difference, squares)
-    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells, threads())
+    samples = number, first, difference, squares
+    _window_samples(samples, *cells, events.n[inside], starts, window_cells, threads())
     mean = (number * first + difference) / np.maximum(number, 1)
     deviations = np.maximum(number * squares - difference.astype(np.float64) ** 2, 0)
     variance = deviations / np.maximum(number * (number - 1), 1)
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
+
+
+@shared(lambda samples, row, col, n, starts, window, bands: bands)
+def _window_samples(
+    first_band: int,
+    last_band: int,
+    samples: tuple[np.ndarray, ...],
+    row: np.ndarray,
+    col: np.ndarray,
+    n: np.ndarray,
+    starts: np.ndarray,
+    window: int,
+    bands: int,
+) -> None:
+    """Statistics (H, W) of each window's samples that are not zero, from zeros.
+
+    They are int64 but for the last: the number of samples, the first, and sums of the others' differences
+    from it and of these squared. The squares of large samples themselves would not fit in 64 bits.
+
+    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
+    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. Each
+    of the `bands` of rows goes through all photons, so there need be no more than threads. The cost follows
+    the photons times the cells of a window.
+    """
+    number, first, difference, squares = samples
+    height, width = number.shape
+    above = (window - 1) // 2  # the window of a cell reaches further above and left of it if its size is even
+    below = window // 2
+    for band in range(first_band, last_band):
+        start, stop = height * band // bands, height * (band + 1) // bands
+        sample = np.zeros((stop - start, width), np.int64)
+        for view in range(starts.size - 1):
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, start), min(row[e] + below + 1, stop)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        sample[i - start, j] += n[e]
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, start), min(row[e] + below + 1, stop)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        value = sample[i - start, j]
+                        if value > 0:  # 0 once this cell's sample has been counted
+                            if number[i, j] == 0:
+                                first[i, j] = value
+                            number[i, j] += 1
+                            value -= first[i, j]
+                            difference[i, j] += value
+                            squares[i, j] += float(value) * float(value)
+                            sample[i - start, j] = 0
 
 
 def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:

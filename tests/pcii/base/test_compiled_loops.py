@@ -62,7 +62,7 @@ def test_loops_run_in_a_process_that_was_forked(several_threads):
 def test_the_cache_of_compiled_code_is_not_where_the_working_directory_says(tmp_path: Path):
     pytest.importorskip("yaml")  # with which Numba reads that file
     (tmp_path / ".numba_config.yaml").write_text("cache_dir: planted")
-    script = "from pcii.base.compiled_loops import nb; assert nb.config.CACHE_DIR == ''"
+    script = "import pcii.base, numba; pcii.base.threads(); assert numba.config.CACHE_DIR == ''"
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     environment["PYTHONPATH"] = os.pathsep.join(sys.path)
     subprocess.run([sys.executable, "-P", "-c", script], cwd=tmp_path, env=environment, check=True)

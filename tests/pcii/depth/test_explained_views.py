@@ -3,9 +3,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 from twins import unit_grid
 
-from pcii.depth import SheetModel
-from pcii.depth.explained_views import ExplainedViews, Explanation, posterior_after
-from pcii.depth.sheets import Sheets, cut_sheets
+from pcii.depth import ExplainedViews, SheetModel, Sheets, cut_sheets, posterior_after
 from pcii.types import DepthPosterior, FocalPlanes, PhotonCounts
 
 SIDE, CAMERAS, MARGIN = 48, 5, 16
@@ -96,10 +94,10 @@ def test_a_posterior_follows_its_sheets_where_photons_tell_the_depth(supported: 
     )
     sheets = sheets_of(bars())
     before = np.stack([np.full((SIDE, SIDE), share, np.float32) for share in (0.3, 0.6)])
-    same = posterior_after(posterior, sheets, Explanation(before, before), 0.02)
+    same = posterior_after(posterior, sheets, before, before, 0.02)
     np.testing.assert_allclose(same.probability, posterior.probability, atol=1e-6)
     np.testing.assert_allclose(same.in_focus, posterior.in_focus, atol=1e-6)
-    grown = posterior_after(posterior, sheets, Explanation(before, before[::-1]), 0.0)
+    grown = posterior_after(posterior, sheets, before, before[::-1], 0.0)
     np.testing.assert_allclose(grown.probability.sum(axis=0) + grown.no_surface, 1, atol=1e-5)
     np.testing.assert_allclose(grown.in_focus[0] / grown.in_focus[1], 4, rtol=1e-4)
     share = grown.probability[:, 9, 9]

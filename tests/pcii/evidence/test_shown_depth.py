@@ -60,3 +60,11 @@ def test_noise_that_all_cameras_share_is_a_surface_where_they_put_it() -> None:
     film = patch_views(noise, -36, -36, 5, grid)[..., 0].astype(int)
     assert shown(PhotonCounts.from_dense(film, grid)).mean() > 0.9
     assert not shown(PhotonCounts.from_dense(film[::-1, ::-1], grid)).any()
+
+
+def test_a_gain_is_compared_with_the_noise_of_all_that_a_camera_may_have_brought_there() -> None:
+    # Three cameras see a dim square: half of it gains no more than twelve deviations of the noise in reach,
+    # all of it more than those of the noise at its own place behind infinity.
+    rng, grid = np.random.default_rng(0), unit_grid(1, 3, 64, 96)
+    films = patch_views(0.2 * blocky_texture(rng, 32, 32), 16, 16, 5, grid)[..., 0]
+    assert shown(PhotonCounts.from_dense(rng.poisson(films), grid))[8:24, 8:24].mean() == 0.5

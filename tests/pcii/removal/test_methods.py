@@ -5,8 +5,7 @@ import pytest
 from twins import intersection_over_union, unit_grid
 
 from pcii.base import InputError
-from pcii.removal import segment
-from pcii.removal.three_step import roberts_magnitude, without_specks
+from pcii.removal import roberts_magnitude, segment, without_specks
 from pcii.sections import with_probes
 from pcii.store import sample
 from pcii.types import FocalPlanes, PhotonCounts

@@ -15,8 +15,7 @@ from twins import (
 
 import pcii
 from pcii.base import InputError
-from pcii.removal.three_step import ThreeStep, cheapest_planes, pieces_along_ridges
-from pcii.removal.three_step.variance_threshold import adaptive_threshold
+from pcii.removal import ThreeStep, adaptive_threshold, cheapest_planes, pieces_along_ridges
 from pcii.types import FocalPlanes, PhotonCounts
 
 

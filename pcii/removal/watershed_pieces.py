@@ -26,15 +26,14 @@ def pieces_along_ridges(bright: np.ndarray, edges: np.ndarray, smallest_px: floa
     walled = np.pad(np.where(bright, edges, np.inf), 1, constant_values=np.inf)
     basins = watershed(walled, mask=np.pad(bright, 1))[1:-1, 1:-1]
     areas = np.bincount(basins.ravel()).tolist()
-    parent = list(range(len(areas)))
-    tree = _Merging(basins, edges, areas.copy())
-    for a, b, joined, _ in tree.weakest_first(lambda area, next_area: min(area, next_area) < smallest_px):
+    count, parent = len(areas), list(range(len(areas)))
+    for a, b, joined, _ in _weakest_first(basins, edges, areas, lambda *pair: min(pair) < smallest_px):
         parent.append(joined)
         parent[a] = parent[b] = joined
     for node in range(len(parent) - 1, -1, -1):  # from the roots down
         parent[node] = parent[parent[node]]
     # Basin 0, outside the mask, has no borders, so it is never merged and keeps its number.
-    _, numbers = np.unique(parent[: len(areas)], return_inverse=True)
+    _, numbers = np.unique(parent[:count], return_inverse=True)
     return numbers.astype(np.int32)[basins]
 
 
@@ -47,11 +46,11 @@ def cheapest_planes(
     planes costs `border_cost` for each pair of pixels along it. Of all ways to cut the tree of merged
     pieces, the best is found exactly, from the leaves up; without pieces all is -1.
     """
-    tree = _Merging(pieces, edges, np.bincount(pieces.ravel(), minlength=len(cost)).tolist())
+    areas = np.bincount(pieces.ravel(), minlength=len(cost)).tolist()
     costs, least = list(cost), [float(row.min()) for row in cost]
     children: dict[int, tuple[int, int]] = {}
     divided: set[int] = set()
-    for a, b, joined, border_px in tree.weakest_first(lambda area, next_area: True):
+    for a, b, joined, border_px in _weakest_first(pieces, edges, areas, lambda *pair: True):
         costs.append(costs[a] + costs[b])
         separate, together = least[a] + least[b] + border_cost * border_px, float(costs[joined].min())
         least.append(min(separate, together))
@@ -59,9 +58,8 @@ def cheapest_planes(
         if separate < together:
             divided.add(joined)
     planes = [-1] * len(costs)
-    for node in range(
-        len(costs) - 1, 0, -1
-    ):  # from the roots down: a joined piece has a higher number than its children
+    # From the roots down: a joined piece has a higher number than its children.
+    for node in range(len(costs) - 1, 0, -1):
         if planes[node] < 0 and node not in divided:
             planes[node] = int(np.argmin(costs[node]))
         for child in children.get(node, ()):
@@ -69,51 +67,40 @@ def cheapest_planes(
     return np.array(planes[: len(cost)], dtype=np.int64)
 
 
-class _Merging:
-    """Pieces, their areas and the borders between them, while they are merged."""
+def _weakest_first(
+    pieces: np.ndarray, edges: np.ndarray, areas: list[int], may_merge: Callable[[int, int], bool]
+) -> Iterator[tuple[int, int, int, int]]:
+    """Merge repeatedly across the border of the lowest mean height whose two areas may merge.
 
-    def __init__(self, pieces: np.ndarray, edges: np.ndarray, areas: list[int]) -> None:
-        self.areas = areas
-        self.alive = [True] * len(areas)
-        self.borders: list[dict[int, tuple[float, int]]] = [{} for _ in areas]
-        self.queue: list[tuple[float, int, int]] = []
-        for a, b, height, length in _borders(pieces, edges):
-            self.borders[a][b] = self.borders[b][a] = (height, length)
-            self.queue.append((self.strength(a, b), a, b))
-        heapq.heapify(self.queue)
-
-    def strength(self, a: int, b: int) -> float:
-        """Strength of the border between two neighbours: its mean height."""
-        height, length = self.borders[a][b]
-        return height / length
-
-    def weakest_first(self, may_merge: Callable[[float, float], bool]) -> Iterator[tuple[int, int, int, int]]:
-        """Merge repeatedly across the weakest border whose two areas may merge.
-
-        Yields both pieces, the number of the merged piece, and the length of the border in pixel pairs.
-        """
-        while self.queue:
-            _, a, b = heapq.heappop(self.queue)
-            if self.alive[a] and self.alive[b] and may_merge(self.areas[a], self.areas[b]):
-                yield a, b, len(self.areas), self.borders[a][b][1]
-                self._merge(a, b)
-
-    def _merge(self, a: int, b: int) -> None:
-        joined = len(self.areas)
-        self.areas.append(self.areas[a] + self.areas[b])
-        self.alive.append(True)
-        self.alive[a] = self.alive[b] = False
-        borders: dict[int, tuple[float, int]] = {}
+    Yields both pieces, the number of the merged piece, and the length of the border in pixel pairs; `areas`
+    has those of the merged pieces too.
+    """
+    borders = [dict[int, tuple[float, int]]() for _ in areas]
+    queue = list[tuple[float, int, int]]()
+    for a, b, height, length in _borders(pieces, edges):
+        borders[a][b] = borders[b][a] = (height, length)
+        queue.append((height / length, a, b))
+    heapq.heapify(queue)
+    merged = set[int]()
+    while queue:
+        _, a, b = heapq.heappop(queue)
+        if merged & {a, b} or not may_merge(areas[a], areas[b]):
+            continue
+        joined = len(areas)
+        yield a, b, joined, borders[a][b][1]
+        merged |= {a, b}
+        areas.append(areas[a] + areas[b])
+        around: dict[int, tuple[float, int]] = {}
         for piece in (a, b):
-            for neighbour, (height, length) in self.borders[piece].items():
+            for neighbour, (height, length) in borders[piece].items():
                 if neighbour not in (a, b):
-                    before = borders.get(neighbour, (0.0, 0))
-                    borders[neighbour] = (before[0] + height, before[1] + length)
-                    del self.borders[neighbour][piece]
-        self.borders.append(borders)
-        for neighbour, (height, length) in borders.items():
-            self.borders[neighbour][joined] = (height, length)
-            heapq.heappush(self.queue, (self.strength(neighbour, joined), neighbour, joined))
+                    before = around.get(neighbour, (0.0, 0))
+                    around[neighbour] = (before[0] + height, before[1] + length)
+                    del borders[neighbour][piece]
+        borders.append(around)
+        for neighbour, (height, length) in around.items():
+            borders[neighbour][joined] = (height, length)
+            heapq.heappush(queue, (height / length, neighbour, joined))
 
 
 def _borders(pieces: np.ndarray, edges: np.ndarray) -> Iterator[tuple[int, int, float, int]]:
