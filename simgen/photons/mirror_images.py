@@ -14,10 +14,9 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.cameras import Rig
-from simgen.photons.bright_light import SEED, BrightLight
-from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, nothing
-from simgen.photons.capture import Capture
-from simgen.photons.emission_sampler import EmissionSampler, film_px
+from simgen.photons.bright_light import BrightLight
+from simgen.photons.candidates import EXPLORATION_SEED, Accepted, Capture, FilmPoints, ImageCells, nothing
+from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
 
@@ -142,14 +141,14 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
 
     def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
-        seed = seeds.integer(SEED, stage="lamp rays", part=part)
+        seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
         if not points.view.size:
             return points, np.zeros(0)
         brought, *_ = sampler.trace_mirrored(points, above, seed)
         return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
 
     for number, light in enumerate(lights):
-        rng = seeds.generator(SEED, stage="lamp rays", part=number)
+        rng = seeds.generator(EXPLORATION_SEED, stage="lamp rays", part=number)
         first, brought = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
         if first.view.size:
             around = _evenly_by_pixel(first, MORE_PATHS, rng)
@@ -194,7 +193,7 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
     _, nearest = KDTree(arrivals.place_mm).query(at_mm, number)
     nearest = nearest.reshape(-1, number)
     away = np.concatenate([arrivals.slope, np.ones((arrivals.light.size, 1))], axis=1)
-    row, col, _ = film_px(capture.rig, views.repeat(number), away[nearest.ravel()], np.zeros((2, 1)))
+    row, col, _ = capture.rig.film_px(views.repeat(number), away[nearest.ravel()])
     seen_px = np.stack([row, col], axis=1).reshape(-1, number, 2)
     aside_mm = arrivals.place_mm[nearest] - at_mm[:, None]
     design = np.concatenate([np.ones((*aside_mm.shape[:2], 1)), aside_mm], axis=2)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pcii.base import LUMINANCE
 from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film
-from simgen.photons.disparity_layers import Samples
+from simgen.photons.majorant import Samples
 from simgen.renderer import objects_by_shape, rows_of
 from simgen.sensor import PhotonTable
 

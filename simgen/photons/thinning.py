@@ -25,13 +25,10 @@ import numpy as np
 
 from pcii.base import InputError, Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler
-from simgen.photons.capture import Capture, ranks_in_scopes
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore
-from simgen.photons.majorant import Majorant
+from simgen.photons.candidates import Accepted, CandidateSampler, Capture, ranks_in_scopes
+from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore, sampler_class
+from simgen.photons.majorant import Majorant, Samples
 from simgen.photons.mirror_images import KnownPlaces
-from simgen.photons.pilot import sampler_class
 from simgen.sensor import PhotonTable, joined, no_photons
 
 WAVEFRONT = 1 << 21

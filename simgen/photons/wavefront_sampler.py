@@ -7,18 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from simgen.photons.candidates import (
-    Accepted,
-    Candidates,
-    CandidateSampler,
-    FilmPoints,
-    ImageCells,
-    is_on_film,
-    nothing,
-)
-from simgen.photons.capture import Capture
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.majorant import NEXT_LAYERS, Majorant
+from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film, nothing
+from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.renderer import (
     FirstHits,
     RandomNumbers,
@@ -53,20 +43,14 @@ class WavefrontSampler(CandidateSampler):
 
     paths_each, max_dark_candidates = 1, 1 << 20
 
-    def __init__(
-        self,
-        capture: Capture,
-        majorant: Majorant,
-        ambient: np.ndarray,
-        image_cells: ImageCells | None = None,
-        below: Majorant | None = None,
-    ) -> None:
-        super().__init__(capture, majorant, ambient, image_cells, below)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        capture, majorant = self.capture, self.majorant
         self.mi = mi = capture.render_scene.mi
         self.dr, self.light = load_drjit(), light_of(capture.render_scene, capture.cfa)
         # Numbers that change from pilot to pilot are passed as data: as constants they would be
         # compiled into the kernel, and each pilot would wait for its own.
-        self.opaque_ambient = [opaque(mi.Float, part) for part in ambient]
+        self.opaque_ambient = [opaque(mi.Float, part) for part in self.ambient]
         sizes = np.array([sums.size for sums in self.running])
         ends = np.cumsum(sizes)
         self.start, self.stop = unsigned(mi, ends - sizes), unsigned(mi, ends - 1)
@@ -80,7 +64,7 @@ class WavefrontSampler(CandidateSampler):
         self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in tiles)
         self.dim, self.bounds = floats(mi, majorant.dim), self._upload_bounds(majorant)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
-        self.bounds_below = self._upload_bounds(below)
+        self.bounds_below = self._upload_bounds(self.below)
         layers = majorant.layers
         self.layer_at = signed(mi, layers.layer_at)
         self.nearness_mm = opaque(mi.Float, layers.disparity_mm / layers.step_px)

@@ -12,8 +12,16 @@ import numpy as np
 from pcii.base import LUMINANCE, InputError
 from simgen.assets import Assets, Triangles, bears_pictures_once, globe, surface_points, triangles_of
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
-from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
-from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
+from simgen.renderer.mitsuba_objects import (
+    WorldFrame,
+    check_texcoords,
+    light_spectrum,
+    linear_bitmap,
+    pose_of,
+    radiance_plugin,
+    solid_parts,
+    texture_plugin,
+)
 from simgen.spec import Card, Scene, SceneObject, Sphere, lights
 from simgen.spectral import DAYLIGHT, Filters, integral
 

@@ -15,8 +15,7 @@ import numpy as np
 from pcii.base import LUMINANCE
 from simgen.cameras import Rig
 from simgen.renderer.backend import is_scalar, load_drjit, vectors
-from simgen.renderer.intersection import objects_by_shape
-from simgen.renderer.mitsuba_scene import RenderScene, shape_number
+from simgen.renderer.mitsuba_scene import RenderScene, objects_by_shape, shape_number
 
 BEGIN_SHARE = 2e-4
 """Light begins this share of a lamp's distance from the cameras away from its surface. Larger: what touches a

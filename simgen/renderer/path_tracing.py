@@ -18,7 +18,7 @@ from simgen.cameras import Rig, film_slopes, slopes_behind_lens
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
 from simgen.renderer.mitsuba_scene import RenderScene, shape_number
-from simgen.renderer.wavelengths import Light
+from simgen.renderer.ray_states import Light
 
 STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""

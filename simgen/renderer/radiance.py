@@ -8,10 +8,8 @@ import numpy as np
 from pcii.base import InputError
 from simgen.cameras import Camera, Cameras, as_rig
 from simgen.renderer.backend import load_drjit, shape_numbers
-from simgen.renderer.intersection import first_objects
-from simgen.renderer.mitsuba_scene import RenderScene, not_finite
-from simgen.renderer.mitsuba_shapes import WorldFrame
-from simgen.renderer.mitsuba_surfaces import spectrum_plugin
+from simgen.renderer.mitsuba_objects import WorldFrame, spectrum_plugin
+from simgen.renderer.mitsuba_scene import RenderScene, first_objects, not_finite
 
 LEAST_STEP_PX = 8
 """Sides of windows are multiples of this at least: smaller steps would save no time that can be measured."""

@@ -5,7 +5,6 @@ Planar depth, object ids and normals are those of the ray through the pixel's ce
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -124,20 +123,6 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
     hits.object_id[row, col], hits.normal[row, col] = ids[second_nearest], normal
 
 
-def over_squares(pick: np.ufunc, values: np.ndarray, side: int) -> np.ndarray:
-    """`pick`, as `numpy.maximum`, over every square of `side` x `side` places that lies in a map (H, W).
-
-    (H - `side` + 1, W - `side` + 1): pad the map first for values up to its border.
-
-    >>> over_squares(np.maximum, np.array([[1, 0, 0, 2], [0, 3, 0, 0]]), 2).tolist()
-    [[3, 3, 2]]
-    """
-    for _ in range(2):  # along rows, then along columns
-        count = len(values) - side + 1
-        values = reduce(pick, (values[first : first + count] for first in range(side))).T
-    return values
-
-
 def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -> np.ndarray:
     """Share (H, W) float32 of each pixel's square in which rays hit the object that its centre hits first.
 
@@ -145,12 +130,14 @@ def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -
     pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its share is
     1: what is lost is only what passes between the centres of pixels.
     """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
     share, number = np.ones(object_id.shape, dtype=np.float32), np.arange(COVERAGE_SAMPLES)
     down = (number + 0.5) / COVERAGE_SAMPLES - 0.5
     right = (number * LATTICE_GENERATOR % COVERAGE_SAMPLES + 0.5) / COVERAGE_SAMPLES - 0.5
     # No object has the id -1: what stands beyond the frame is another for all we know.
-    framed = np.pad(object_id, 1, constant_values=-1)
-    row, col = np.nonzero(over_squares(np.maximum, framed, 3) != over_squares(np.minimum, framed, 3))
+    most, least = (pick(object_id, 3, mode="constant", cval=-1) for pick in (maximum_filter, minimum_filter))
+    row, col = np.nonzero(most != least)
     for start in range(0, row.size, PIXELS_AT_ONCE):
         i, j = row[start : start + PIXELS_AT_ONCE], col[start : start + PIXELS_AT_ONCE]
         rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)

@@ -11,8 +11,7 @@ from simgen.dataset import capture_of
 from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import sensitivities
 from simgen.spec import Recipe, Scene
-from simgen.spectral import patch_names
-from simgen.spectral.spectra import colour_science
+from simgen.spectral import colour_science, patch_names
 
 pytestmark = [
     pytest.mark.renders,

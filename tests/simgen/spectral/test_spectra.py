@@ -13,15 +13,16 @@ from simgen.base import validate
 from simgen.spec import Scene
 from simgen.spectral import (
     WAVELENGTH_NM,
+    colour_science,
     filters_for,
     illuminant,
     integral,
+    linear_srgb,
     observer,
     patch,
     patch_names,
     sensitivity,
 )
-from simgen.spectral.spectra import colour_science, linear_srgb
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 
