@@ -156,9 +156,7 @@ class Capture:
 
 def ranks_in_scopes(scope: np.ndarray) -> np.ndarray:
     """Number (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
-    number = np.bincount(scope)
-    first = np.cumsum(number) - number
-    return np.arange(scope.size) - first[scope]
+    return np.arange(scope.size) - np.searchsorted(scope, scope)
 
 
 class ImageCells(NamedTuple):
@@ -191,6 +189,12 @@ def nothing(channels: int) -> Accepted:
     """No photons."""
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
     return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
+
+
+def is_of_group(cells: list[np.ndarray], group: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
+    """Which pixels (N,) are on a Bayer cell (2 a + b) of their `group` (N,), whose cells are `cells`."""
+    is_cell_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
+    return is_cell_of_group[group, row % 2 * 2 + col % 2]
 
 
 class FilmPoints(NamedTuple):

@@ -27,7 +27,7 @@ import numpy as np
 from pcii.base import LUMINANCE
 from pcii.types import colour_cells
 from simgen.cameras import Rig, as_rig, corners
-from simgen.photons.candidates import Accepted, Capture, is_on_film, nothing
+from simgen.photons.candidates import Capture, is_of_group, is_on_film
 from simgen.renderer import ShiningSurface, standing_before
 from simgen.sensor import PhotonTable
 
@@ -276,20 +276,18 @@ class EmissionSampler:
             self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
             self.mass = float(self.running[-1]) if self.running.size else 0.0
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`.
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons of a candidate for each of `group` (N,) on the film of `view` (N,), and whose each is.
 
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
         light = self.arriving(view, np.random.default_rng(seed))
-        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-        light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
+        light = light.take(is_of_group(cells, group[light.candidate], light.row, light.col))
         k, l = np.divmod(view[light.candidate], self.capture.grid.cols)
         origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
-        photons = PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin)
-        return nothing(self.capture.channels)._replace(photons=photons, candidate=light.candidate)
+        return PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin), light.candidate
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
         """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""

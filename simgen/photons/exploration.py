@@ -128,10 +128,12 @@ class Plan:
     excess_share: float = 0.0
     """Share of the light that lay above the bounds in the last rehearsals."""
 
-    @property
-    def image_cells(self) -> ImageCells | None:
-        """Cells of the films that paths leave out, since images of lamps are drawn there apart."""
-        return None if self.known_places is None else self.known_places.image_cells
+    def sampler(
+        self, capture: Capture, majorant: Majorant, below: Majorant | None = None
+    ) -> CandidateSampler:
+        """The sampler of a majorant in this light; it leaves out images of lamps, which are drawn apart."""
+        cells = None if self.known_places is None else self.known_places.image_cells
+        return sampler_class(capture)(capture, majorant, self.ambient, cells, below)
 
 
 def explore(capture: Capture, plan: Plan | None = None) -> Plan:
@@ -329,8 +331,8 @@ def _kept_share(capture: Capture, known: EmissionSampler | MirrorImages | KnownP
         return 0.0
     view = np.arange(AIMED_RAYS) % capture.grid.view_count
     path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-    accepted = known.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
-    return accepted.photons.k.size / AIMED_RAYS
+    photons, _ = known.draw(np.zeros_like(view), view, [np.arange(4)], path_seed)
+    return photons.k.size / AIMED_RAYS
 
 
 def _warm_up(
@@ -344,12 +346,8 @@ def _warm_up(
     paths, kept_share, excess_share, is_bounded = plan.paths, KEPT_SHARE_GUESS, 0.0, False
     rare, shares = list[BrightLight](), list[float]()
     allowed, groups = MAX_MISSING_SD / math.sqrt(max(photons, 1.0)), len(capture.cell_groups)
-
-    def sampler_of_majorant() -> CandidateSampler:
-        return sampler_class(capture)(capture, majorant, plan.ambient, plan.image_cells)
-
     for turn in range(-WARM_UP_ROUNDS, MAX_REHEARSALS):
-        sampler = sampler_of_majorant()
+        sampler = plan.sampler(capture, majorant)
         wanted, most = photons / kept_share, REHEARSAL_PATHS // sampler.paths_each
         if turn < 0:
             wanted, most = WARM_UP_SHARE * photons / KEPT_SHARE_GUESS, WARM_UP_CANDIDATES[1]
@@ -377,7 +375,7 @@ def _warm_up(
     if not is_bounded:  # rehearsals are draws of the same light
         unmet = tuple(row._replace(light=row.light / len(shares)) for row in rare)
         plan = replace(plan, bright_light=unmet)
-    return plan, float(sampler_of_majorant().mass.mean())
+    return plan, float(plan.sampler(capture, majorant).mass.mean())
 
 
 def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.ndarray) -> list[BrightLight]:

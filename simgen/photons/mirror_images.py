@@ -15,7 +15,7 @@ import numpy as np
 from simgen.base import random_streams as seeds
 from simgen.cameras import Rig
 from simgen.photons.bright_light import BrightLight
-from simgen.photons.candidates import EXPLORATION_SEED, Accepted, Capture, FilmPoints, ImageCells, nothing
+from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, is_of_group
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
@@ -58,18 +58,13 @@ class MirrorImages:
         self.of_view = self.running[np.searchsorted(cells.number, first)]
         self.mass = float(np.diff(self.of_view).max())
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`.
-
-        `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
-        """
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons as of `EmissionSampler.draw`."""
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-        bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
-        here = is_of_group[group[candidate], bayer]
+        here = is_of_group(cells, group[candidate], points.row.astype(np.int64), points.col.astype(np.int64))
         points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
         radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
@@ -78,8 +73,7 @@ class MirrorImages:
         i, j = points.row.astype(np.int64), points.col.astype(np.int64)
         origin = {"object_id": object_id, "z_mm": z_mm}
         photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
-        accepted = nothing(self.sampler.capture.channels)
-        return accepted._replace(photons=photons, candidate=candidate.repeat(number))
+        return photons, candidate.repeat(number)
 
     def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
         """Light of a film, mean of all views, by the number of mirrors before it, of `number` candidates."""
@@ -117,10 +111,10 @@ class KnownPlaces:
         """Cells in which images of lamps are drawn, which paths through the film leave out."""
         return next((part.cells for part in self.parts if isinstance(part, MirrorImages)), None)
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`."""
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons as of `EmissionSampler.draw`."""
         which = np.zeros(view.size, dtype=np.int64)
         if len(self.parts) > 1:
             rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
@@ -128,10 +122,10 @@ class KnownPlaces:
         tables, candidates = [no_photons()], [np.zeros(0, dtype=np.int64)]
         for number, part in enumerate(self.parts):
             here = np.flatnonzero(which == number)
-            accepted = part.try_candidates(group[here], view[here], cells, seed)
-            tables.append(accepted.photons)
-            candidates.append(here[accepted.candidate])
-        return nothing(1)._replace(photons=joined(tables), candidate=np.concatenate(candidates))
+            photons, candidate = part.draw(group[here], view[here], cells, seed)
+            tables.append(photons)
+            candidates.append(here[candidate])
+        return joined(tables), np.concatenate(candidates)
 
 
 def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> MirrorImages | None:
