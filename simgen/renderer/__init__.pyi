@@ -10,9 +10,8 @@ from .mitsuba_scene import RenderScene as RenderScene, blocked as blocked, build
 from .mitsuba_scene import first_objects as first_objects, first_points as first_points
 from .mitsuba_scene import not_finite as not_finite, objects_by_shape as objects_by_shape
 from .mitsuba_scene import rows_of as rows_of, standing_before as standing_before
-from .path_tracing import FirstHits as FirstHits, bright_directions as bright_directions
-from .path_tracing import film_rays as film_rays, hit_first as hit_first
-from .path_tracing import mirrored_radiance as mirrored_radiance, radiance_along as radiance_along
+from .path_tracing import FirstHits as FirstHits, PathTracer as PathTracer
+from .path_tracing import bright_directions as bright_directions, film_rays as film_rays
 from .path_tracing import surrounding_radiance as surrounding_radiance
 from .radiance import render_view as render_view, sensor_plugin as sensor_plugin
 from .radiance import windows_of_objects as windows_of_objects
