@@ -5,7 +5,7 @@ surface, drawn with the bound of its piece, and a camera; it is kept with probab
 on the film and nothing stands in between. By the mapping theorem the kept ones are a Poisson process on the
 film whose rate is the radiance of the surface where it is seen: a lamp of a thousandth of a pixel gets its
 photons as a window of a million does. Paths through the film leave this light out
-(`path_tracing.radiance_along`).
+(`PathTracer.radiance_along`).
 
 A point P of a surface with the normal n, which a camera at C sees at depth z, fills the film per mm^2 of
 surface with (f / pixel)^2 n.(C - P) / z^3 px, so a piece of the radiance L sends the film at most

@@ -10,9 +10,8 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types import CameraGrid
 from simgen.assets import Assets, read_assets, triangles_of
-from simgen.renderer import emission
 from simgen.renderer.backend import floats, is_scalar, load_drjit, shape_numbers, vectors
-from simgen.renderer.emission import ShiningSurface
+from simgen.renderer.emission import SceneLights, ShiningSurface
 from simgen.renderer.mitsuba_objects import (
     WorldFrame,
     card_pose,
@@ -23,7 +22,7 @@ from simgen.renderer.mitsuba_objects import (
     surface_plugin,
 )
 from simgen.renderer.mitsuba_reference import Reference, reference_to
-from simgen.spec import MOST_OBJECTS, Backdrop, EnvironmentLight, Mesh, Scene, Sphere
+from simgen.spec import MOST_OBJECTS, Backdrop, Mesh, Scene, Sphere
 from simgen.spectral import Filters, filters_for
 
 BACKDROP, OBJECT, LIGHT = "simgen:backdrop", "simgen:object", "simgen:light"
@@ -57,6 +56,13 @@ class RenderScene:
     medium: Any = None
     hides_surroundings: bool = False
 
+    @property
+    def corners_mm(self) -> np.ndarray:
+        """Corners (N, 8, 3), in the world, of the boxes around Mitsuba's shapes."""
+        boxes = [shape.bbox() for shape in self.scene.shapes()]
+        corners = [[np.ravel(box.corner(number)) for number in range(8)] for box in boxes]
+        return self.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
+
 
 def build(
     mi: Any,
@@ -82,23 +88,22 @@ def build(
         if scene.level is not None:
             referenced_lux = reference.illuminance_lux(scene.level.z_mm)
     around = scene.light_around
-    surroundings = assets.environments[around.file] if isinstance(around, EnvironmentLight) else None
     hides_surroundings = around is not None and not around.visible
     if hides_surroundings and has_media:
         raise InputError(
             f"{folder}: lights: one that is not visible does not go with a medium; leave out visible"
         )
-    gain = emission.level_gain(mi, scene, assets, surroundings, referenced_lux)
-    plugins = _object_plugins(mi, scene, assets, gain, frame)
+    lights = SceneLights(mi, scene, assets, frame, referenced_lux)
+    plugins = _object_plugins(lights)
     if scene.backdrop is not None:
         plugins[BACKDROP] = _backdrop_plugin(mi, scene.backdrop, frame)
     for number, light in enumerate(scene.lights, start=1):
-        plugins[f"{LIGHT}{number}"] = emission.light_plugin(mi, light, gain, surroundings, frame)
-    filters = None if curves is None else filters_for(curves, emission.main_spectrum(mi, scene))
-    shining, why_rendered = list(emission.shining_surfaces(mi, scene, assets, gain, filters)), ""
+        plugins[f"{LIGHT}{number}"] = lights.light_plugin(light)
+    filters = None if curves is None else filters_for(curves, lights.main_spectrum())
+    shining, why_rendered = list(lights.surfaces(filters)), ""
     integrator, medium = {"type": "volpath" if has_media else "path", "max_depth": max_depth}, None
     if reference is not None:
-        loaded, medium = reference.build(plugins, integrator, gain)
+        loaded, medium = reference.build(plugins, integrator, lights.gain)
         surfaces, why_rendered = reference.shining_surfaces(loaded, ids, filters)
         shining += surfaces
     else:
@@ -153,8 +158,9 @@ def _backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, An
     return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
 
 
-def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:
+def _object_plugins(lights: SceneLights) -> dict[str, Any]:
     """Shapes of all objects by id; objects that look alike share a surface."""
+    mi, scene, assets = lights.mi, lights.scene, lights.assets
     plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
     patterns = paint_patterns(scene.objects)
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
@@ -163,9 +169,9 @@ def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: W
             if key not in surfaces:
                 surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
             parts = {"bsdf": surfaces[key]}
-            if (emitter := emission.emission_plugin(mi, thing, assets, gain)) is not None:
+            if (emitter := lights.object_plugin(thing)) is not None:
                 parts["emitter"] = mi.load_dict(emitter)
-            plugins[f"{OBJECT}{number}"] = shape_plugin(mi, thing, assets, parts, reach_mm, frame)
+            plugins[f"{OBJECT}{number}"] = shape_plugin(mi, thing, assets, parts, reach_mm, lights.frame)
         except InputError as fault:
             raise InputError(f"object '{thing.name}', {fault}") from None
     return plugins

@@ -169,16 +169,8 @@ class PathTracer:
         """
         mi, dr, scene, max_depth = self.mi, self.dr, self.scene, self.render_scene.max_depth
 
-        def lengthen(
-            active: Any,
-            left: Any,
-            ray: Any,
-            hit: Any,
-            radiance: Any,
-            weight: Any,
-            last_bright: Any,
-            sampler: Any,
-        ) -> tuple[Any, ...]:
+        def lengthen(*path: Any) -> tuple[Any, ...]:
+            active, left, ray, hit, radiance, weight, last_bright, sampler = path
             choice, pair = sampler.next_1d(active), sampler.next_2d(active)
             sample, of_segment = hit.bsdf(ray).sample(self.context, hit, choice, pair, active)
             active &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta) & dr.any(of_segment != 0)
@@ -214,12 +206,11 @@ class PathTracer:
         if max_depth == 1:
             return radiance
         bsdf = hit.bsdf(ray)
-        radiance += self._direct_light(hit, bsdf, sampler, STRATA, BOUNCES, is_hit)
+        radiance += self._direct_light(hit, bsdf, sampler, is_hit, STRATA, BOUNCES)
         left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
         for bounce in range(BOUNCES):
-            ray, end, active, emitted, weight, still_hidden = self._next_segment(
-                hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit, hidden_above
-            )
+            segment = self._next_segment(hit, bsdf, sampler, is_hit, hidden_above, bounce)
+            ray, end, active, emitted, weight, still_hidden = segment
             path = active, left, ray, end, emitted, mi.Spectrum(1), still_hidden, sampler
             if max_depth > 2:
                 # A loop also for short paths: it is as fast as unrolled segments.
@@ -228,28 +219,18 @@ class PathTracer:
             radiance += weight * light / BOUNCES
         return radiance
 
-    def _lengthen(
-        self,
-        active: Any,
-        left: Any,
-        ray: Any,
-        hit: Any,
-        radiance: Any,
-        throughput: Any,
-        hidden_above: Any,
-        sampler: Any,
-    ) -> tuple[Any, ...]:
+    def _lengthen(self, *path: Any) -> tuple[Any, ...]:
         """Paths with one more segment, unless Russian roulette (Arvo and Kirk 1990) ends them.
 
         `ray` and `hit` are of the last segment, `radiance` is what all segments from the second hit on have
         brought so far, and `throughput` what share of the light that leaves `hit` arrives at the path's
         beginning. Paths that are active have `left` more segments at most.
         """
+        active, left, ray, hit, radiance, throughput, hidden_above, sampler = path
         dr, bsdf = self.dr, hit.bsdf(ray)
-        direct = throughput * self._direct_light(hit, bsdf, sampler, 1, 1, active)
-        ray, hit, active, emitted, weight, hidden_above = self._next_segment(
-            hit, bsdf, sampler, 1, 1, 0, active, hidden_above
-        )
+        direct = throughput * self._direct_light(hit, bsdf, sampler, active)
+        segment = self._next_segment(hit, bsdf, sampler, active, hidden_above)
+        ray, hit, active, emitted, weight, hidden_above = segment
         throughput = throughput * weight
         radiance = radiance + direct + throughput * emitted
         left = left - 1
@@ -261,7 +242,9 @@ class PathTracer:
         throughput = dr.select(is_faint, throughput * (ROULETTE_THROUGHPUT / largest), throughput)
         return active, left, ray, hit, radiance, throughput, hidden_above, sampler
 
-    def _direct_light(self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, active: Any) -> Any:
+    def _direct_light(
+        self, hit: Any, bsdf: Any, sampler: Any, active: Any, side: int = 1, bounces: int = 1
+    ) -> Any:
         """Light straight from all lamps, from `side` x `side` points of each, that leaves `hit` backwards."""
         mi, dr, radiance = self.mi, self.dr, self.mi.Spectrum(0)
         scatters = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
@@ -276,25 +259,17 @@ class PathTracer:
         return radiance
 
     def _next_segment(
-        self,
-        hit: Any,
-        bsdf: Any,
-        sampler: Any,
-        side: int,
-        bounces: int,
-        bounce: int,
-        active: Any,
-        hidden_above: Any,
+        self, hit: Any, bsdf: Any, sampler: Any, active: Any, hidden_above: Any, bounce: int | None = None
     ) -> tuple[Any, ...]:
-        """The segment that leaves `hit` as number `bounce` of `bounces`, in a direction that `bsdf` chose.
+        """The segment that leaves `hit`, the first one as number `bounce`, in a direction that `bsdf` chose.
 
-        Its ray, its end, whether a path goes on from there, what shines there, weighted against aiming at it
-        (at `side` x `side` points of each lamp), the share of the light along the ray that leaves `hit`, and
-        `hidden_above` from there on.
+        Its ray, its end, whether a path goes on from there, what shines there, weighted against aiming at it,
+        the share of the light along the ray that leaves `hit`, and `hidden_above` from there on.
         """
+        side, bounces = (1, 1) if bounce is None else (STRATA, BOUNCES)
         mi, dr, place = self.mi, self.dr, self.mi.Interaction3f(hit)
         across = sampler.next_2d(active)
-        across.x = (across.x + bounce) / bounces
+        across.x = (across.x + (bounce or 0)) / bounces
         sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
         active = active & dr.any(weight != 0)
         ray = hit.spawn_ray(hit.to_world(sample.wo))

@@ -140,17 +140,14 @@ def windows_of_objects(
     render_scene: RenderScene, camera: Camera, samples_per_pixel: int, background_samples: int
 ) -> tuple[list[Window], int]:
     """Where objects can be seen, and how many light paths fewer samples elsewhere save."""
-    scene = render_scene.scene
-    is_object = render_scene.object_of_shape[shape_numbers(scene)] > 0
-    boxes = [shape.bbox() for shape, is_one in zip(scene.shapes(), is_object, strict=True) if is_one]
-    corners = [[box.corner(number) for number in range(8)] for box in boxes]
-    corners_mm = render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
-    windows, pixels = object_windows(camera, corners_mm), camera.grid.height * camera.grid.width
+    is_object = render_scene.object_of_shape[shape_numbers(render_scene.scene)] > 0
+    windows = _object_windows(camera, render_scene.corners_mm[is_object])
+    pixels = camera.grid.height * camera.grid.width
     covered = sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
     return windows, (samples_per_pixel - background_samples) * pixels - samples_per_pixel * covered
 
 
-def object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
+def _object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
     """Windows that do not overlap, outside of which the camera sees none of the boxes with corners (N, 8, 3).
 
     The whole film is the only one if a box reaches behind the camera, or if the camera has a lens.

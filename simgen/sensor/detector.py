@@ -244,8 +244,7 @@ def _first_counts(counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: i
     if sensor.readout.most_per_frame is None:
         return counts.take(order)
     cell = cell[order]
-    first = np.flatnonzero(np.diff(cell, prepend=-1))
-    place = np.arange(cell.size) - first.repeat(np.diff(first, append=cell.size))
+    place = np.arange(cell.size) - np.searchsorted(cell, cell)
     return counts.take(order[place < sensor.readout.most_per_frame])
 
 

@@ -5,7 +5,6 @@ Planar depth, object ids and normals are those of the ray through the pixel's ce
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -209,7 +208,5 @@ def _can_be_blocked(render_scene: RenderScene, rig: Rig, start: np.ndarray) -> n
 
 def shape_boxes_mm(render_scene: RenderScene) -> np.ndarray:
     """Bounding boxes (N, 2, 3) of the renderer's shapes in the world: least and largest X, Y, Z."""
-    boxes: list[Any] = [shape.bbox() for shape in render_scene.scene.shapes()]
-    corners = [[np.ravel(box.corner(number)) for number in range(8)] for box in boxes]
-    corners_mm = render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
+    corners_mm = render_scene.corners_mm
     return np.stack([corners_mm.min(axis=1), corners_mm.max(axis=1)], axis=1)
