@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
+from poisson_counts import is_poisson
 from scipy import stats
 
 from pcii.base import InputError, silent
@@ -91,13 +92,6 @@ def by_scope(views: np.ndarray, scope: str) -> np.ndarray:
         return views.sum()[None]
     colours = colour_index(HEIGHT, WIDTH, "GRBG")
     return np.concatenate([views[:, colours == colour].sum(axis=1) for colour in range(3)])
-
-
-def is_poisson(totals: np.ndarray, budget: float) -> bool:
-    """Whether mean and variance are those of as many Poisson numbers, within 4 standard errors."""
-    n = totals.size
-    mean_fits = abs(totals.mean() - budget) < 4 * np.sqrt(budget / n)
-    return bool(mean_fits and abs(totals.var(ddof=1) - budget) < 4 * np.sqrt((budget + 2 * budget**2) / n))
 
 
 @pytest.mark.parametrize(("scope", "draws"), [("view", 150), ("channel", 50), ("scene", 600)])
