@@ -18,7 +18,7 @@ from pcii.types import CameraGrid, channel_count, colour_cells
 from simgen.base import random_streams as seeds
 from simgen.cameras import Cameras, Rig, as_rig, corners, with_larger_pixels
 from simgen.photons.majorant import Majorant, Samples
-from simgen.renderer import RenderScene, not_finite
+from simgen.renderer import RenderScene
 from simgen.sensor import PhotonTable, no_photons
 from simgen.spec import Photons
 from simgen.truth import first_hits_of_view
@@ -310,4 +310,4 @@ class CandidateSampler(ABC):
         if wrong.size:
             k, l, row, col = (int(np.array(part)[wrong[0]]) for part in candidates[:4])
             scene, number = self.capture.render_scene, int(object_id[wrong[0]])
-            raise InputError(not_finite(scene, number, (k, l), (row, col), self.capture.grid))
+            raise InputError(scene.not_finite(number, (k, l), (row, col), self.capture.grid))

@@ -28,7 +28,7 @@ from pcii.base import LUMINANCE
 from pcii.types import colour_cells
 from simgen.cameras import Rig, as_rig, corners
 from simgen.photons.candidates import Capture, is_of_group, is_on_film
-from simgen.renderer import ShiningSurface, standing_before
+from simgen.renderer import ShiningSurface
 from simgen.sensor import PhotonTable
 
 NEAREST_MM = 1e-3
@@ -43,6 +43,9 @@ SLIVER = 1e-6
 """A triangle whose height is a smaller share of its longest side has no area: its normal is mere rounding."""
 ROUNDING = 1 + 1e-9
 """The bound is raised by this factor, above the rounding of what it is compared with."""
+SHADOW_EPSILON = 1e-5
+"""Of the distance: what stands nearer than this before a shining point does not hide it. Single precision
+errs by a hundredth of it."""
 
 
 class Pieces(NamedTuple):
@@ -216,11 +219,6 @@ def _across(corners_mm: np.ndarray) -> np.ndarray:
     return np.cross(corners_mm[:, 1] - corners_mm[:, 0], corners_mm[:, 2] - corners_mm[:, 0])
 
 
-SHADOW_EPSILON = 1e-5
-"""Of the distance: what stands nearer than this before a shining point does not hide it. Single precision
-errs by a hundredth of it."""
-
-
 class ShiningPoints(NamedTuple):
     """Points (N,) that shine, the lens points that they are seen from, and where they fall on the film.
 
@@ -300,9 +298,7 @@ class EmissionSampler:
         is_kept = chance[which] * points.bound < points.sent * radiance
         light = Arriving(which, row, col, points.surface, radiance, points.point_mm[:, 2]).take(is_kept)
         points = points.take(is_kept)
-        blocker = standing_before(
-            self.capture.render_scene, points.camera_mm, points.point_mm, SHADOW_EPSILON
-        )
+        blocker = self.capture.render_scene.standing_before(points.camera_mm, points.point_mm, SHADOW_EPSILON)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
         is_itself = self.is_ball[light.surface] & (blocker == self.numbers[light.surface])
         return light.take((blocker < 0) | is_itself)

@@ -6,10 +6,7 @@ from .emission import ShiningSurface as ShiningSurface
 from .light_tracing import Arrivals as Arrivals, LampTracer as LampTracer
 from .mitsuba_objects import light_spectrum as light_spectrum
 from .mitsuba_reference import reference_to as reference_to
-from .mitsuba_scene import RenderScene as RenderScene, blocked as blocked, build as build
-from .mitsuba_scene import first_objects as first_objects, first_points as first_points
-from .mitsuba_scene import not_finite as not_finite, objects_by_shape as objects_by_shape
-from .mitsuba_scene import rows_of as rows_of, standing_before as standing_before
+from .mitsuba_scene import RenderScene as RenderScene, build as build, rows_of as rows_of
 from .path_tracing import FirstHits as FirstHits, PathTracer as PathTracer
 from .path_tracing import bright_directions as bright_directions, film_rays as film_rays
 from .path_tracing import surrounding_radiance as surrounding_radiance

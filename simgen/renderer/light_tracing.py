@@ -15,7 +15,7 @@ import numpy as np
 from pcii.base import LUMINANCE
 from simgen.cameras import Rig
 from simgen.renderer.backend import is_scalar, load_drjit, vectors
-from simgen.renderer.mitsuba_scene import RenderScene, objects_by_shape, shape_number
+from simgen.renderer.mitsuba_scene import RenderScene
 
 BEGIN_SHARE = 2e-4
 """Light begins this share of a lamp's distance from the cameras away from its surface. Larger: what touches a
@@ -104,7 +104,7 @@ class LampTracer:
     @cached_property
     def objects(self) -> list[int]:
         """The object that each lamp belongs to: 0 if it is a lamp of the scene, -1 for the surroundings."""
-        ids = objects_by_shape(self.render_scene)
+        ids = self.render_scene.objects_by_shape()
         return [-1 if lamp.is_environment() else int(ids[lamp.get_shape().id()]) for lamp in self.lamps]
 
     def radiance_of(self, lamp: np.ndarray, seed: int) -> np.ndarray:
@@ -256,7 +256,7 @@ class LampTracer:
         or clear; and how it goes on from there, by random `numbers` (N, 3)."""
         mi, scene = self.render_scene.mi, self.render_scene.scene
         context = mi.BSDFContext(mi.TransportMode.Importance)
-        ids = objects_by_shape(self.render_scene) if is_scalar(mi) else {}
+        ids = self.render_scene.objects_by_shape() if is_scalar(mi) else {}
 
         def end(columns: Any, wavelengths: Any) -> tuple[Any, ...]:
             ray = mi.RayDifferential3f(
@@ -270,7 +270,7 @@ class LampTracer:
             sample, weight = hit.bsdf(ray).sample(context, hit, columns[6], pair, is_hit)
             onwards = hit.spawn_ray(hit.to_world(sample.wo))
             is_perfect = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-            shape = ids[(hit.instance or hit.shape).id()] if ids else shape_number(self.render_scene, hit)
+            shape = ids[(hit.instance or hit.shape).id()] if ids else self.render_scene.shape_number(hit)
             return hit.t, shape, is_perfect, weight, onwards.o, onwards.d
 
         columns = np.concatenate([rays.origin, rays.direction, numbers], axis=1)

@@ -1,4 +1,6 @@
-"""Where things stand in the renderer, and their shapes: Mitsuba's sphere and rectangle, or meshes.
+"""Objects in the renderer: where they stand, their shapes and surfaces, their colours as textures.
+
+Shapes are Mitsuba's sphere and rectangle, or meshes; plugins are those of the variant that is set.
 
 Cameras and objects are brought to the axes of a Mitsuba file that a scene refers to: not all of Mitsuba's
 plugins could be moved (in 3.9 a turned `sdfgrid` is cut off, and scaled curves keep their radius).
@@ -18,6 +20,7 @@ from pcii.base import LUMINANCE, InputError, srgb_to_linear
 from simgen.assets import Assets, Triangles, cut_out, globe, paint, triangles_of
 from simgen.renderer.backend import is_spectral
 from simgen.spec import (
+    Backdrop,
     Box,
     Card,
     Cylinder,
@@ -116,7 +119,7 @@ def shape_plugin(
     T, pose, shape = mi.ScalarTransform4f, frame.pose(mi, pose_of(mi, thing)), thing.shape
     matrix, is_whole = np.array(pose.matrix, dtype=np.float64), thing.material.opacity is None
     if isinstance(shape, Card) and is_whole:
-        to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
+        to_world = pose @ _card_pose(mi, shape.width_mm, shape.height_mm)
         return {"type": "rectangle", "to_world": to_world} | parts
     if isinstance(shape, Sphere) and is_whole:
         if "emitter" in parts and shape.radius_mm < SMALL_BALL_SHARE * reach_mm:
@@ -175,10 +178,18 @@ def check_texcoords(where: str, shape: Shape, assets: Assets) -> None:
         raise InputError(f"{where}: {shape.file!r} has no texture coordinates; add them, or leave it out")
 
 
-def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
+def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces -Z, with v towards -Y."""
     T = mi.ScalarTransform4f
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
+
+
+def backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, Any]:
+    """A matt wall, seen from either side."""
+    matt = {"type": "diffuse", "reflectance": _reflectance_plugin(mi, wall.reflectance)}
+    pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
+    to_world = pose @ _card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
 
 
 def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
@@ -231,7 +242,7 @@ def surface_plugin(
 
     def reflectance() -> dict[str, Any]:
         if material.reflectance is not None:
-            return reflectance_plugin(mi, material.reflectance)
+            return _reflectance_plugin(mi, material.reflectance)
         pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
         assert pixels is not None
         # Pixels are linear, so they are colours as they stand, which spectral variants make spectra.
@@ -297,7 +308,7 @@ def aspect_of(shape: Shape) -> float:
             return 1.0
 
 
-def reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
+def _reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
     """One reflectance all over. In a spectral variant sRGB is turned into a smooth spectrum by Mitsuba."""
     if isinstance(reflectance, tuple):
         return {"type": "rgb", "value": srgb_to_linear(np.array(reflectance)).tolist()}

@@ -16,7 +16,7 @@ import numpy as np
 from simgen.cameras import Rig, film_slopes, slopes_behind_lens
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
-from simgen.renderer.mitsuba_scene import RenderScene, shape_number
+from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.ray_states import Light
 
 STRATA = 2
@@ -144,7 +144,7 @@ class PathTracer:
         record = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
         is_hit, missed = active & hit.is_valid(), active & ~hit.is_valid()
-        shape = dr.select(is_hit, shape_number(self.render_scene, hit), 0)
+        shape = dr.select(is_hit, self.render_scene.shape_number(hit), 0)
         z_mm = dr.select(is_hit, self.render_scene.frame.z_mm(hit.p), dr.inf)
         guess, bsdf = self._surroundings_seen(hit, missed), hit.bsdf(ray)
         for lamp in self.lamps:

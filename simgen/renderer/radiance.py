@@ -9,7 +9,7 @@ from pcii.base import InputError
 from simgen.cameras import Camera, Cameras, as_rig
 from simgen.renderer.backend import load_drjit, shape_numbers
 from simgen.renderer.mitsuba_objects import WorldFrame, spectrum_plugin
-from simgen.renderer.mitsuba_scene import RenderScene, first_objects, not_finite
+from simgen.renderer.mitsuba_scene import RenderScene
 
 LEAST_STEP_PX = 8
 """Sides of windows are multiples of this at least: smaller steps would save no time that can be measured."""
@@ -84,8 +84,8 @@ def render_view(
     wrong = np.argwhere(~np.isfinite(image).all(axis=2))
     if wrong.size:
         row, col = wrong[0].tolist()
-        number = int(first_objects(render_scene, camera.position_mm, camera.towards(*wrong[:1].T))[0])
-        raise InputError(not_finite(render_scene, number, (k, l), (row, col), camera.grid))
+        number = int(render_scene.first_objects(camera.position_mm, camera.towards(*wrong[:1].T))[0])
+        raise InputError(render_scene.not_finite(number, (k, l), (row, col), camera.grid))
     return image
 
 

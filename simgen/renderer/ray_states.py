@@ -1,7 +1,8 @@
-"""Random numbers of light paths in compiled backends: a stream in each lane, of a seed of any size.
+"""What each ray of compiled backends carries: random numbers, and light in colours or at wavelengths.
 
 Samplers of Mitsuba take seeds of 32 bits, which some 80 000 datasets are enough to make equal in two of them.
-All here is arithmetic of integers, so numbers are the same on every machine.
+Random numbers here have seeds of any size, and come of arithmetic of integers alone, so that they are the
+same on every machine. Light is carried as three colours, or at four wavelengths for a pixel's filter.
 """
 
 from collections.abc import Iterator

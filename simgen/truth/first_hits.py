@@ -11,7 +11,7 @@ import numpy as np
 from pcii.base import Report, silent
 from pcii.types import CameraGrid
 from simgen.cameras import Camera, Cameras, Rig, as_rig, centre_camera
-from simgen.renderer import RenderScene, blocked, first_objects, first_points, sensor_plugin
+from simgen.renderer import RenderScene, sensor_plugin
 
 BESIDE_EDGE_PX = 0.01
 """Rays so far from a pixel's centre pass beside an edge between triangles that the centre meets exactly: much
@@ -85,7 +85,7 @@ def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
     z_mm = np.where(hit, point[..., 2], np.inf)
     if render_scene.has_instances:  # the renderer's output has the shape within the instance
         towards = camera.towards(*np.indices(hit.shape).reshape(2, -1))
-        object_id = first_objects(render_scene, camera.position_mm, towards).reshape(hit.shape)
+        object_id = render_scene.first_objects(camera.position_mm, towards).reshape(hit.shape)
     else:
         object_id = render_scene.object_of_shape[shape]
     hits = FirstHits(z_mm.astype(np.float32), object_id.astype(np.int16), facing.astype(np.float32))
@@ -107,7 +107,7 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
         return
     down, right = BESIDE_EDGE_PX * np.array([[-1, -1, 1, 1], [-1, 1, -1, 1]])
     rays = camera.towards(row[:, None] + down, col[:, None] + right)  # (N, 4, 3)
-    points, normals, ids = first_points(render_scene, camera.position_mm, rays.reshape(-1, 3))
+    points, normals, ids = render_scene.first_points(camera.position_mm, rays.reshape(-1, 3))
     depth = points[:, 2].reshape(-1, 4)
     number = np.argsort(depth, axis=1)[:, 1]  # the second nearest
     is_nearer = depth < nearer[row, col, None]
@@ -140,7 +140,7 @@ def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -
     for start in range(0, row.size, PIXELS_AT_ONCE):
         i, j = row[start : start + PIXELS_AT_ONCE], col[start : start + PIXELS_AT_ONCE]
         rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)
-        hit_id = first_objects(render_scene, camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
+        hit_id = render_scene.first_objects(camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
         share[i, j] = (hit_id == object_id[i, j, None]).mean(axis=1)
     return share
 
@@ -173,7 +173,7 @@ def visible_views(
         is_visible = camera.on_film(point) & (normal @ camera.position_mm > facing)
         tested = np.flatnonzero(is_visible & may_be_blocked)
         if tested.size:
-            is_visible[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
+            is_visible[tested] = ~render_scene.blocked(start[tested], camera.position_mm)
         count += is_visible
         traced += tested.size
         report("visibility", done, grid.view_count)
