@@ -182,8 +182,13 @@ def corners(grid: CameraGrid) -> list[tuple[int, int]]:
     return [(k, l) for k in sorted({0, grid.rows - 1}) for l in sorted({0, grid.cols - 1})]
 
 
-def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> CameraGrid:
-    """The same field of view on pixels `scale` times as large, at least `least_px` of them to a side."""
+def coarser(grid: CameraGrid, side_px: int, *, least_px: int = 1, may_be_finer: bool = False) -> CameraGrid:
+    """The same cameras with the same field of view on at most `side_px` pixels to a side, and `least_px`.
+
+    Pixels become smaller only if it `may_be_finer`.
+    """
+    scale = max(grid.shape_HW) / side_px
+    scale = scale if may_be_finer else max(1.0, scale)
     return replace(
         grid,
         height=max(least_px, round(grid.height / scale)),
@@ -191,11 +196,6 @@ def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> Came
         pixel_mm=grid.pixel_mm * scale,
         shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
     )
-
-
-def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
-    """The same cameras with the same field of view on at most `side_px` pixels to a side."""
-    return with_larger_pixels(grid, max(1.0, max(grid.shape_HW) / side_px), least_px=1)
 
 
 def centre_camera(grid: CameraGrid) -> Camera:

@@ -16,7 +16,7 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types import CameraGrid, channel_count, colour_cells
 from simgen.base import random_streams as seeds
-from simgen.cameras import Cameras, Rig, as_rig, corners, with_larger_pixels
+from simgen.cameras import Cameras, Rig, as_rig, coarser, corners
 from simgen.photons.majorant import Majorant, Samples
 from simgen.renderer import RenderScene
 from simgen.sensor import PhotonTable, no_photons
@@ -71,7 +71,7 @@ class Capture:
     @property
     def coarse_grid(self) -> CameraGrid:
         """The same cameras with the same field of view on few pixels."""
-        return with_larger_pixels(self.grid, max(self.grid.shape_HW) / COARSE_PX, least_px=2)
+        return coarser(self.grid, COARSE_PX, least_px=2, may_be_finer=True)
 
     @cached_property
     def coarse_z_mm(self) -> np.ndarray:
@@ -209,27 +209,27 @@ class FilmPoints(NamedTuple):
         which = is_on_film(grid, self.row, self.col)
         return FilmPoints(self.view[which], self.row[which], self.col[which])
 
+    @classmethod
+    def evenly(cls, grid: CameraGrid, number: int, seed: int) -> "FilmPoints":
+        """About `number` points: one in each cell of a lattice over the film.
+
+        Views take turns. Points come in random order, so that the first of them are spread as all are.
+        """
+        rng = np.random.default_rng(seed)
+        rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
+        cols = max(1, round(number / rows))
+        cell = rng.permutation(rows * cols)
+        row, col = np.divmod(cell, cols)
+        down, right = rng.random((2, cell.size))
+        # Rounding must not move a point onto the next film.
+        i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
+        j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
+        return cls(rng.permutation(cell.size) % grid.view_count, i, j)
+
 
 def is_on_film(grid: CameraGrid, row: Any, col: Any) -> Any:
     """Whether rows and columns lie on the film; arrays of NumPy or of the renderer."""
     return (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
-
-
-def even_film_points(grid: CameraGrid, number: int, seed: int) -> FilmPoints:
-    """About `number` points: one in each cell of a lattice over the film.
-
-    Views take turns. Points come in random order, so that the first of them are spread as all are.
-    """
-    rng = np.random.default_rng(seed)
-    rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
-    cols = max(1, round(number / rows))
-    cell = rng.permutation(rows * cols)
-    row, col = np.divmod(cell, cols)
-    down, right = rng.random((2, cell.size))
-    # Rounding must not move a point onto the next film.
-    i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
-    j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
-    return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
 
 
 class Candidates(NamedTuple):

@@ -22,7 +22,6 @@ from simgen.photons.candidates import (
     Capture,
     FilmPoints,
     ImageCells,
-    even_film_points,
 )
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.majorant import (
@@ -187,7 +186,7 @@ def _send_pilot(capture: Capture, plan: Plan) -> tuple[Plan, np.ndarray]:
         # A colour that the pilot did not find may be there nevertheless.
         dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
         path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
-        points = even_film_points(grid, rays, path_seed)
+        points = FilmPoints.evenly(grid, rays, path_seed)
         samples = [first, lit, sampler.trace(points, followed, path_seed)]
         aimed = _aimed_points(capture, emission)
         if aimed.view.size:
@@ -250,7 +249,7 @@ def _send_first_pilot(sampler: CandidateSampler) -> tuple[Samples, int]:
     round_number, rays, paths = 0, FIRST_RAYS, 0
     while True:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
-        points = even_film_points(sampler.capture.grid, rays, path_seed)
+        points = FilmPoints.evenly(sampler.capture.grid, rays, path_seed)
         samples = sampler.trace(points, rays, path_seed)
         samples = samples.take(samples.followed)
         paths += sampler.count_paths(rays, rays)
@@ -283,7 +282,7 @@ def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: fl
     capture, grid = sampler.capture, sampler.capture.grid
     rays = int(min(RAYS_PER_CONTRAST * contrast, MAX_OPENING_RAYS))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=3)
-    openings = _trace_misses(sampler, even_film_points(capture.grid, rays, path_seed), path_seed)
+    openings = _trace_misses(sampler, FilmPoints.evenly(capture.grid, rays, path_seed), path_seed)
     depths_mm = z_mm[np.isfinite(z_mm)].astype(np.float64)
     if not openings.k.size or not depths_mm.size:
         return openings, rays

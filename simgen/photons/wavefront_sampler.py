@@ -19,7 +19,6 @@ from simgen.renderer import (
     gathered,
     light_of,
     load_drjit,
-    of_colour,
     opaque,
     signed,
     streams_for,
@@ -309,7 +308,7 @@ class WavefrontSampler(CandidateSampler):
 
     def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
         """What each candidate's pixel gets of radiance that rays carry."""
-        return of_colour(self._per_colour(radiance, candidates), candidates.colour)
+        return self.light.in_own_colour(radiance, candidates.colour, candidates.wavelength_sample)
 
     def _exceeding(self, candidates: Candidates, first: FirstHits, light: Any, over: Any) -> Samples:
         candidates, first = _take(candidates, over), _take(first, over)

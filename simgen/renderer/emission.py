@@ -9,21 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base import LUMINANCE, InputError
+from pcii.base import LUMINANCE, InputError, srgb_to_linear
 from simgen.assets import Assets, Triangles, bears_pictures_once, globe, surface_points, triangles_of
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
 from simgen.renderer.mitsuba_objects import (
     WorldFrame,
     check_texcoords,
-    light_spectrum,
     linear_bitmap,
     pose_of,
-    radiance_plugin,
     solid_parts,
+    spectrum_plugin,
     texture_plugin,
 )
 from simgen.spec import Card, Scene, SceneObject, Sphere, lights
-from simgen.spectral import DAYLIGHT, Filters, integral
+from simgen.spectral import DAYLIGHT, Filters, integral, spectra
 
 NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
@@ -77,7 +76,7 @@ class SceneLights:
 
         def radiance(luminance_cd_m2: float, illuminant: lights.Illuminant) -> np.ndarray:
             if filters is None:
-                return np.array(radiance_plugin(self.mi, self.gain * luminance_cd_m2, illuminant)["value"])
+                return np.array(_radiance_plugin(self.mi, self.gain * luminance_cd_m2, illuminant)["value"])
             spectrum = self.gain * luminance_cd_m2 * light_spectrum(self.mi, illuminant)
             return integral(filters.sensitivity * spectrum)
 
@@ -120,7 +119,7 @@ class SceneLights:
             return None
         luminance = self.gain * emission.luminance_cd_m2
         if emission.texture is None:
-            return {"type": "area", "radiance": radiance_plugin(self.mi, luminance, emission.illuminant)}
+            return {"type": "area", "radiance": _radiance_plugin(self.mi, luminance, emission.illuminant)}
         if is_spectral(self.mi):
             raise InputError(f"{where}: images shine only in linear sRGB; leave it or sensor.camera out")
         check_texcoords(where, shape, self.assets)
@@ -140,7 +139,7 @@ class SceneLights:
         per_cd = 1e6 * frame.unit**2  # cd = cd/m^2 m^2, with lengths in the renderer's unit
 
         def bright(value: float, per_unit: float = 1.0) -> dict[str, Any]:
-            return radiance_plugin(mi, gain * value * per_unit, getattr(light, "illuminant", DAYLIGHT))
+            return _radiance_plugin(mi, gain * value * per_unit, getattr(light, "illuminant", DAYLIGHT))
 
         match light:
             case lights.UniformLight():
@@ -217,6 +216,33 @@ class SceneLights:
         return float(emission.luminance_cd_m2 * shares.sum())
 
 
+def _radiance_plugin(mi: Any, luminance_cd_m2: float, colour: lights.Illuminant) -> dict[str, Any]:
+    """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
+    if is_spectral(mi):
+        return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
+    if isinstance(colour, str):
+        rgb = spectra.tint(colour)
+    else:
+        rgb = srgb_to_linear(np.array(colour))
+        rgb /= LUMINANCE @ rgb
+    return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
+
+
+def light_spectrum(mi: Any, colour: lights.Illuminant) -> np.ndarray:
+    """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
+
+    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019).
+    """
+    if isinstance(colour, str):
+        return spectra.illuminant(colour)
+    rgb = srgb_to_linear(np.array(colour))
+    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), spectra.WAVELENGTH_NM)
+    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * spectra.illuminant(spectra.DAYLIGHT)
+    luminosity = spectra.observer()[1]
+    luminance = spectra.integral(luminosity * spectra.illuminant(spectra.DAYLIGHT))
+    return filtered * (luminance / spectra.integral(luminosity * filtered))
+
+
 def _narrow_spot(mi: Any, light: lights.SpotLight, gain: float, to_world: Any) -> dict[str, Any]:
     """A spot lamp as a projector of its beam's picture. Raises `InputError` in spectral mode."""
     if is_spectral(mi):
@@ -233,7 +259,7 @@ def _narrow_spot(mi: Any, light: lights.SpotLight, gain: float, to_world: Any) -
     # A projector of irradiance E has the intensity pi E / cos^3.
     share *= (1 + slope**2) ** -1.5 / np.pi
     share = share.reshape(BEAM_PX, BEAM_PARTS, BEAM_PX, BEAM_PARTS).mean(axis=(1, 3))
-    rgb = np.array(radiance_plugin(mi, gain * light.intensity_cd, light.illuminant)["value"])
+    rgb = np.array(_radiance_plugin(mi, gain * light.intensity_cd, light.illuminant)["value"])
     bitmap = linear_bitmap(mi, np.ascontiguousarray(share[..., None] * rgb, dtype=np.float32))
     picture = {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
     return {"type": "projector", "irradiance": picture, "fov": 2 * reach_deg, "to_world": to_world}

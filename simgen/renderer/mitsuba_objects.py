@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base import LUMINANCE, InputError, srgb_to_linear
+from pcii.base import InputError, srgb_to_linear
 from simgen.assets import Assets, Triangles, cut_out, globe, paint, triangles_of
 from simgen.renderer.backend import is_spectral
 from simgen.spec import (
@@ -25,7 +25,6 @@ from simgen.spec import (
     Card,
     Cylinder,
     Glass,
-    Illuminant,
     Material,
     Matt,
     Mesh,
@@ -319,33 +318,6 @@ def _reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
     if is_spectral(mi):
         return spectrum_plugin(spectrum)
     return {"type": "rgb", "value": spectra.linear_srgb(spectrum).tolist()}
-
-
-def radiance_plugin(mi: Any, luminance_cd_m2: float, colour: Illuminant) -> dict[str, Any]:
-    """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
-    if is_spectral(mi):
-        return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
-    if isinstance(colour, str):
-        rgb = spectra.tint(colour)
-    else:
-        rgb = srgb_to_linear(np.array(colour))
-        rgb /= LUMINANCE @ rgb
-    return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
-
-
-def light_spectrum(mi: Any, colour: Illuminant) -> np.ndarray:
-    """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
-
-    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019).
-    """
-    if isinstance(colour, str):
-        return spectra.illuminant(colour)
-    rgb = srgb_to_linear(np.array(colour))
-    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), spectra.WAVELENGTH_NM)
-    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * spectra.illuminant(spectra.DAYLIGHT)
-    luminosity = spectra.observer()[1]
-    luminance = spectra.integral(luminosity * spectra.illuminant(spectra.DAYLIGHT))
-    return filtered * (luminance / spectra.integral(luminosity * filtered))
 
 
 def spectrum_plugin(values: np.ndarray) -> dict[str, Any]:

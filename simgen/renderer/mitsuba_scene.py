@@ -91,7 +91,7 @@ class RenderScene:
         )
 
     def first_objects(self, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Object id (N,) int16, 0 for none, of what rays from an origin (3,) in directions (N, 3) hit first."""
+        """Object id (N,) int16, 0 for none, of what rays from an origin (3,) in directions (N, 3) hit."""
         return np.maximum(self._objects_hit(origin_mm, direction, np.inf), 0)
 
     def first_points(

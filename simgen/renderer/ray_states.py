@@ -79,6 +79,10 @@ class Light:
         """Colours to follow rays in, one after the other, so that together they show all."""
         yield colour
 
+    def in_own_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """What each pixel gets, in its own colour, of radiance that rays carry."""
+        return _of_colour(self.per_colour(radiance, colour, wavelength_sample), colour)
+
     def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
         """Radiance in each colour that these wavelengths show, 0 in the others; luminance without a CFA."""
         if self.cfa is not None:
@@ -106,7 +110,7 @@ class SpectralLight(Light):
         # It has the spectrum of most of the light.
         wavelengths_nm, _ = self._draw(colour, wavelength_sample)
         white = gathered(self.white, colour)
-        relative = load_drjit().select(white > 0, of_colour(ambient, colour) / white, 0)
+        relative = load_drjit().select(white > 0, _of_colour(ambient, colour) / white, 0)
         return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in wavelengths_nm))
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
@@ -147,7 +151,7 @@ def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     return Light(mi, cfa) if filters is None else SpectralLight(mi, filters)
 
 
-def of_colour(values: Any, colour: Any) -> Any:
+def _of_colour(values: Any, colour: Any) -> Any:
     """Each element's value in its own colour, of `values` in all colours."""
     first, *others = values
     if not others:
