@@ -21,7 +21,7 @@ from simgen.renderer.mitsuba_objects import (
     spectrum_plugin,
     texture_plugin,
 )
-from simgen.spec import Card, Scene, SceneObject, Sphere, lights
+from simgen.spec import Card, Illuminant, Scene, SceneObject, Sphere, lights
 from simgen.spectral import DAYLIGHT, Filters, integral, spectra
 
 NODES = 32
@@ -74,7 +74,7 @@ class SceneLights:
     def surfaces(self, filters: Filters | None) -> Iterator[ShiningSurface]:
         """All that shines and can be seen: lamps with a surface, and objects."""
 
-        def radiance(luminance_cd_m2: float, illuminant: lights.Illuminant) -> np.ndarray:
+        def radiance(luminance_cd_m2: float, illuminant: Illuminant) -> np.ndarray:
             if filters is None:
                 return np.array(_radiance_plugin(self.mi, self.gain * luminance_cd_m2, illuminant)["value"])
             spectrum = self.gain * luminance_cd_m2 * light_spectrum(self.mi, illuminant)
@@ -216,7 +216,7 @@ class SceneLights:
         return float(emission.luminance_cd_m2 * shares.sum())
 
 
-def _radiance_plugin(mi: Any, luminance_cd_m2: float, colour: lights.Illuminant) -> dict[str, Any]:
+def _radiance_plugin(mi: Any, luminance_cd_m2: float, colour: Illuminant) -> dict[str, Any]:
     """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
     if is_spectral(mi):
         return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
@@ -228,7 +228,7 @@ def _radiance_plugin(mi: Any, luminance_cd_m2: float, colour: lights.Illuminant)
     return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
 
 
-def light_spectrum(mi: Any, colour: lights.Illuminant) -> np.ndarray:
+def light_spectrum(mi: Any, colour: Illuminant) -> np.ndarray:
     """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
 
     A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019).
