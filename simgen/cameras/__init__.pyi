@@ -4,4 +4,4 @@ from .disparities import shares_without as shares_without, spread_px_mm as sprea
 from .rig import Camera as Camera, Cameras as Cameras, Rig as Rig, as_rig as as_rig
 from .rig import centre_camera as centre_camera, corners as corners, film_slopes as film_slopes
 from .rig import rig_of as rig_of, slopes_behind_lens as slopes_behind_lens
-from .rig import coarser as coarser, with_larger_pixels as with_larger_pixels
+from .rig import coarser as coarser

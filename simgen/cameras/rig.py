@@ -118,6 +118,30 @@ class Rig:
         radius, turn = self.lens.aperture_mm / 2 * np.sqrt(numbers[0]), 2 * np.pi * numbers[1]
         return radius * np.stack([np.cos(turn), np.sin(turn)])
 
+    def film_px(
+        self, view: np.ndarray, away_mm: np.ndarray, lens_point: np.ndarray | float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Row and column on the films of `view` (N,), and planar depth in mm, of what a lens's point sees.
+
+        `away_mm` (N, 3) is where that is from the point of the lens, (2, N). NaN behind the camera.
+        """
+        k, l = np.divmod(view, self.grid.cols)
+        x, y, z_mm = np.einsum("nba,nb->an", self.rotation[k, l], away_mm)
+        z_mm = np.where(z_mm > 0, z_mm, np.nan)
+        if self.lens is not None:
+            x, y = np.stack([x, y]) + lens_point * z_mm / self.lens.focus_mm
+        scale_px, axis_px = self.grid.focal_mm / self.grid.pixel_mm, self.axis_px[k, l]
+        return y / z_mm * scale_px + axis_px[:, 1], x / z_mm * scale_px + axis_px[:, 0], z_mm
+
+    def image_px_per_mm2(self, normal: np.ndarray, away_mm: np.ndarray, z_mm: np.ndarray) -> np.ndarray:
+        """Area (N,) of the image, in px^2, of each mm^2 of a surface of this unit `normal` (N, 3).
+
+        It is `away_mm` (N, 3) from the camera, at the planar depth `z_mm` (N,); 0 if it faces away, or if the
+        depth is NaN.
+        """
+        scale_px = self.grid.focal_mm / self.grid.pixel_mm
+        return np.nan_to_num(scale_px**2 * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3)
+
     def rays(
         self, k: np.ndarray, l: np.ndarray, row_px: np.ndarray, col_px: np.ndarray, lens_point: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -158,8 +182,13 @@ def corners(grid: CameraGrid) -> list[tuple[int, int]]:
     return [(k, l) for k in sorted({0, grid.rows - 1}) for l in sorted({0, grid.cols - 1})]
 
 
-def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> CameraGrid:
-    """The same field of view on pixels `scale` times as large, at least `least_px` of them to a side."""
+def coarser(grid: CameraGrid, side_px: int, *, least_px: int = 1, may_be_finer: bool = False) -> CameraGrid:
+    """The same cameras with the same field of view on at most `side_px` pixels to a side, and `least_px`.
+
+    Pixels become smaller only if it `may_be_finer`.
+    """
+    scale = max(grid.shape_HW) / side_px
+    scale = scale if may_be_finer else max(1.0, scale)
     return replace(
         grid,
         height=max(least_px, round(grid.height / scale)),
@@ -167,11 +196,6 @@ def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> Came
         pixel_mm=grid.pixel_mm * scale,
         shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
     )
-
-
-def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
-    """The same cameras with the same field of view on at most `side_px` pixels to a side."""
-    return with_larger_pixels(grid, max(1.0, max(grid.shape_HW) / side_px), least_px=1)
 
 
 def centre_camera(grid: CameraGrid) -> Camera:

@@ -13,15 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, FilmPoints, is_on_film, nothing
-from simgen.photons.capture import Capture
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.emission_sampler import EmissionSampler, film_px, image_px_per_mm2
+from simgen.photons.candidates import (
+    EXPLORATION_SEED,
+    CandidateSampler,
+    Capture,
+    FilmPoints,
+    is_on_film,
+    nothing,
+)
+from simgen.photons.emission_sampler import EmissionSampler
+from simgen.photons.majorant import Samples
 from simgen.renderer import Arrivals, LampTracer
 
-SEED = 0
-"""What is found decides on how photons are drawn, not where they fall: with one seed for all, datasets that
-differ in nothing but their seed are made alike."""
 LEAST_SHARE = 0.01
 """Smallest share of a film's light that bright light is looked for: the noise that rendered views may have.
 If it is larger, more light may be missing; if it is smaller, more is searched and refused."""
@@ -95,7 +98,7 @@ def straight_light(capture: Capture) -> list[BrightLight]:
     emission = EmissionSampler(capture)
     if not emission.mass or capture.render_scene.why_rendered:
         return []
-    rng = seeds.generator(SEED, stage="aimed pilot", part=2)
+    rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=2)
     arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % capture.grid.view_count, rng)
     light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
     rows = _rows(arriving.surface[None], light, arriving.radiance)
@@ -113,7 +116,7 @@ def mirrored_light(
     `film_light` is the sum of radiance over a film as it is known. With `with_straight` also what comes
     straight from lamps that `straight_light` does not know.
     """
-    grid, z_mm, render_scene = capture.grid, capture.coarse_z_mm, capture.render_scene
+    z_mm, render_scene = capture.coarse_z_mm, capture.render_scene
     depth_mm = float(np.median(z_mm[np.isfinite(z_mm)])) if np.isfinite(z_mm).any() else 0.0
     reach_mm = float(np.linalg.norm(capture.rig.position_mm[..., :2], axis=-1).max())
     disc_mm = max(reach_mm, MIN_DISC_SHARE * depth_mm, MIN_DISC_MM)
@@ -122,9 +125,11 @@ def mirrored_light(
     is_known = np.array([number in known for number in tracer.objects], dtype=bool)
     if not (tracer.has_mirrors or (with_straight and not is_known.all())):
         return []
-    least_radiance = brightest_that_matters(film_light, paths, grid.height * grid.width)
+    least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
     survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % max(len(tracer.lamps), 1)
-    is_bright = tracer.radiance_of(survey, seeds.integer(SEED, stage="lamp rays")) > least_radiance
+    is_bright = (
+        tracer.radiance_of(survey, seeds.integer(EXPLORATION_SEED, stage="lamp rays")) > least_radiance
+    )
     lamps = np.unique(survey[is_bright]) if len(tracer.lamps) else survey[:0]
     if not lamps.size:
         return []
@@ -154,7 +159,7 @@ def _arrivals(
     parts, rays = list[tuple[int, Arrivals]](), 0
     while True:
         number, round_number = max(rays, FIRST_RAYS), len(parts) + 1
-        seed = seeds.integer(SEED, stage="lamp rays", round_number=round_number)
+        seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", round_number=round_number)
         arrivals, brightest = tracer.follow(np.resize(lamps, number), seed, least_radiance)
         parts.append((number, arrivals.take((arrivals.bounces > 0) | is_searched[arrivals.lamp])))
         rays += number
@@ -176,19 +181,19 @@ def lit_light(
     and paths through these places."""
     capture = sampler.capture
     tracer = LampTracer(capture.render_scene, capture.rig, capture.cfa, 0.0)
-    least_radiance = brightest_that_matters(film_light, paths, capture.grid.height * capture.grid.width)
+    least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
     rows, samples = list[BrightLight](), [nothing(capture.channels).exceeding]
-    for lit in tracer.lit_places(LIT_POINTS, seeds.integer(SEED, stage="lamp rays")):
+    for lit in tracer.lit_places(LIT_POINTS, seeds.integer(EXPLORATION_SEED, stage="lamp rays")):
         view = np.arange(lit.area_mm2.size) % capture.grid.view_count
         k, l = np.divmod(view, capture.grid.cols)
         away_mm = lit.point_mm - capture.rig.position_mm[k, l]
-        row, col, z_mm = film_px(capture.rig, view, away_mm, np.zeros((2, 1)))
-        image_px = lit.area_mm2 * image_px_per_mm2(capture.rig, lit.normal, away_mm, z_mm)
+        row, col, z_mm = capture.rig.film_px(view, away_mm)
+        image_px = lit.area_mm2 * capture.rig.image_px_per_mm2(lit.normal, away_mm, z_mm)
         here = np.flatnonzero(is_on_film(capture.grid, row + 0.5, col + 0.5) & (image_px > 0))
         if not here.size:
             continue
         points = FilmPoints(view[here], row[here] + 0.5, col[here] + 0.5)
-        traced = sampler.trace(points, here.size, seeds.integer(SEED, stage="lamp rays", part=1))
+        traced = sampler.trace(points, here.size, seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=1))
         # Where the depth is another one, something stands before the place.
         radiance = np.where(
             np.isclose(traced.z_mm, z_mm[here], rtol=SAME_DEPTH), traced.light.mean(axis=1), 0

@@ -1,21 +1,162 @@
-"""Candidates of photons: rays drawn from a majorant, and followed if they may be bright enough to be kept.
+"""What is captured: a scene as cameras behind a Bayer pattern see it, and how much of its light is counted.
 
-What all backends share: `wavefront_sampler` traces all candidates at once, `scalar_sampler` one after the
-other.
+Photons are counted over scopes: an exposure of each view, or a budget of each view, of each colour of each
+view, or of the whole scene (a recipe's `photons.scope`). Candidates of photons are rays drawn from a
+majorant, and followed if they may be bright enough to be kept: `wavefront_sampler` traces all of them at
+once, `scalar_sampler` one after the other.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from pcii.base import InputError
-from pcii.types import CameraGrid, colour_cells
-from simgen.photons.capture import Capture
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.majorant import Majorant
-from simgen.renderer import not_finite
+from pcii.types import CameraGrid, channel_count, colour_cells
+from simgen.base import random_streams as seeds
+from simgen.cameras import Cameras, Rig, as_rig, coarser, corners
+from simgen.photons.majorant import Majorant, Samples
+from simgen.renderer import RenderScene
 from simgen.sensor import PhotonTable, no_photons
+from simgen.spec import Photons
+from simgen.truth import first_hits_of_view
+
+EXPLORATION_SEED = 0
+"""What is found before photons are drawn decides how they are drawn, not where they fall: with one seed for
+all, datasets that differ in nothing but their seed are made alike, with the origins of photons or without."""
+COARSE_PX = 64
+"""Longer side of films on which a scene is looked at first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """A scene in the renderer, cameras, the Bayer pattern `cfa`, the light that is counted, and the seed.
+
+    `photons_per_radiance` are the photons that a pixel catches of a unit of radiance, for an exposure; None
+    for a budget. `dark_map` is what pixels count without any, as of `detect`. Raises ValueError for an
+    exposure without `photons_per_radiance`, and for a budget with it.
+    """
+
+    render_scene: RenderScene
+    cameras: Cameras
+    cfa: str | None
+    photons: Photons = field(default_factory=Photons)
+    photons_per_radiance: float | None = None
+    seed: int = 0
+    dark_map: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if (self.photons_per_radiance is None) == (self.photons.scope == "exposure"):
+            raise ValueError(
+                "photons_per_radiance: needed for photons of scope 'exposure', and for no others"
+            )
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The cameras as they really are."""
+        return as_rig(self.cameras)
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras as they ought to be."""
+        return self.rig.grid
+
+    @property
+    def pixels(self) -> int:
+        """Pixels of a view."""
+        return self.grid.height * self.grid.width
+
+    @property
+    def coarse_grid(self) -> CameraGrid:
+        """The same cameras with the same field of view on few pixels."""
+        return coarser(self.grid, COARSE_PX, least_px=2, may_be_finer=True)
+
+    @cached_property
+    def coarse_z_mm(self) -> np.ndarray:
+        """Depths (N,) in mm that the corner cameras see on few pixels; inf where nothing is hit."""
+        coarse = self.coarse_grid
+        hits = [first_hits_of_view(self.render_scene, coarse, k, l) for k, l in corners(coarse)]
+        return np.concatenate([of_view.z_mm.ravel() for of_view in hits])
+
+    @property
+    def channels(self) -> int:
+        """Colours of the sensor's pixels: 3, or 1 for a monochrome sensor."""
+        return channel_count(self.cfa)
+
+    @cached_property
+    def cell_groups(self) -> list[np.ndarray]:
+        """Groups of Bayer cells (2 a + b) that are counted apart: those of each colour, or all of them."""
+        if self.photons.scope != "channel":
+            return [np.arange(4)]
+        cells = colour_cells(self.cfa).ravel()
+        return [np.flatnonzero(cells == colour) for colour in range(self.channels)]
+
+    @property
+    def has_one_budget(self) -> bool:
+        """Whether one budget is that of all views together."""
+        return self.photons.scope == "scene"
+
+    @cached_property
+    def view_of_scope(self) -> np.ndarray:
+        """View of each scope (S,), -1 for all views together."""
+        views = np.array([-1]) if self.has_one_budget else np.arange(self.grid.view_count)
+        return views.repeat(len(self.cell_groups))
+
+    @cached_property
+    def group_of_scope(self) -> np.ndarray:
+        """Number of each scope's group of cells (S,)."""
+        return np.arange(self.view_of_scope.size) % len(self.cell_groups)
+
+    def scope_of(self, photons: PhotonTable) -> np.ndarray:
+        """Number of the scope that each row (N,) of a table is counted in."""
+        if self.has_one_budget:
+            return np.zeros(photons.k.size, dtype=np.int64)
+        view, groups = photons.k.astype(np.int64) * self.grid.cols + photons.l, len(self.cell_groups)
+        return view * groups + photons.colours(self.cfa) if groups > 1 else view
+
+    @property
+    def budget_per_view(self) -> float | None:
+        """Photons of a view that a budget asks for; None for an exposure."""
+        if self.photons_per_radiance is not None:
+            return None
+        if self.has_one_budget:
+            return self.photons.budget / self.grid.view_count
+        return self.photons.budget * len(self.cell_groups)
+
+    @property
+    def budget_pixels(self) -> int | None:
+        """Pixels over which a budget is counted, of the rarest colour at worst; None for an exposure."""
+        if self.photons_per_radiance is not None:
+            return None
+        if self.has_one_budget:
+            return self.pixels * self.grid.view_count
+        return max(self.pixels // 4, 1) if len(self.cell_groups) > 1 else self.pixels
+
+    def expected_photons(self, radiance: np.ndarray) -> float:
+        """Photons of all views, given the mean radiance (C,) of each colour."""
+        if self.photons_per_radiance is None:
+            return self.photons.budget * self.view_of_scope.size
+        per_pixel = self.photons_per_radiance * radiance[colour_cells(self.cfa).ravel()].mean()
+        return float(per_pixel * (self.grid.view_count * self.pixels))
+
+    def draw_totals(self) -> np.ndarray:
+        """Photons that each scope is to have (S,), int64: of a Poisson budget random, else exact.
+
+        A scope of an exposure takes as many as come.
+        """
+        size, photons = self.view_of_scope.size, self.photons
+        if photons.scope == "exposure":
+            return np.full(size, np.iinfo(np.int64).max)
+        if photons.statistics == "multinomial":
+            return np.full(size, round(photons.budget))
+        return seeds.generator(self.seed, stage="budget totals").poisson(photons.budget, size)
+
+
+def ranks_in_scopes(scope: np.ndarray) -> np.ndarray:
+    """Number (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
+    return np.arange(scope.size) - np.searchsorted(scope, scope)
 
 
 class ImageCells(NamedTuple):
@@ -50,6 +191,12 @@ def nothing(channels: int) -> Accepted:
     return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
 
 
+def is_of_group(cells: list[np.ndarray], group: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
+    """Which pixels (N,) are on a Bayer cell (2 a + b) of their `group` (N,), whose cells are `cells`."""
+    is_cell_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
+    return is_cell_of_group[group, row % 2 * 2 + col % 2]
+
+
 class FilmPoints(NamedTuple):
     """Points (N,) of films: view, and row and column from the film's corner in [0, H) and [0, W)."""
 
@@ -62,27 +209,27 @@ class FilmPoints(NamedTuple):
         which = is_on_film(grid, self.row, self.col)
         return FilmPoints(self.view[which], self.row[which], self.col[which])
 
+    @classmethod
+    def evenly(cls, grid: CameraGrid, number: int, seed: int) -> "FilmPoints":
+        """About `number` points: one in each cell of a lattice over the film.
+
+        Views take turns. Points come in random order, so that the first of them are spread as all are.
+        """
+        rng = np.random.default_rng(seed)
+        rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
+        cols = max(1, round(number / rows))
+        cell = rng.permutation(rows * cols)
+        row, col = np.divmod(cell, cols)
+        down, right = rng.random((2, cell.size))
+        # Rounding must not move a point onto the next film.
+        i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
+        j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
+        return cls(rng.permutation(cell.size) % grid.view_count, i, j)
+
 
 def is_on_film(grid: CameraGrid, row: Any, col: Any) -> Any:
     """Whether rows and columns lie on the film; arrays of NumPy or of the renderer."""
     return (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
-
-
-def even_film_points(grid: CameraGrid, number: int, seed: int) -> FilmPoints:
-    """About `number` points: one in each cell of a lattice over the film.
-
-    Views take turns. Points come in random order, so that the first of them are spread as all are.
-    """
-    rng = np.random.default_rng(seed)
-    rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
-    cols = max(1, round(number / rows))
-    cell = rng.permutation(rows * cols)
-    row, col = np.divmod(cell, cols)
-    down, right = rng.random((2, cell.size))
-    # Rounding must not move a point onto the next film.
-    i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
-    j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
-    return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
 
 
 class Candidates(NamedTuple):
@@ -106,37 +253,34 @@ class Candidates(NamedTuple):
     wavelength_sample: Any = None
 
 
+@dataclass(eq=False)
 class CandidateSampler(ABC):
     """A majorant as candidates are drawn from it, in light that is guessed to be `ambient` (C,) all around.
 
     Each comes of one group of Bayer cells (`Capture.cell_groups`). What is drawn apart in `image_cells` is
-    left out. `running` are for each group the
-    sums of the bounds of all pixels, in one view, up to and with those of an entry's cell; the last is their
-    `mass` (G,), border tiles counted whole. With an earlier majorant `below`, of the same tiles and nowhere
-    higher, what lies between the two is drawn: of the tiles that have been raised alone, and of each path the
-    part of its radiance above the earlier bound.
+    left out. `running` are for each group the sums of the bounds of all pixels, in one view, up to and with
+    those of an entry's cell; the last is their `mass` (G,), border tiles counted whole. With an earlier
+    majorant `below`, of the same tiles and nowhere higher, what lies between the two is drawn: of the tiles
+    that have been raised alone, and of each path the part of its radiance above the earlier bound.
     """
 
-    paths_each: int
+    capture: Capture
+    majorant: Majorant
+    ambient: np.ndarray
+    image_cells: ImageCells | None = None
+    below: Majorant | None = None
+    paths_each: ClassVar[int]
     """Light paths of a candidate that is followed."""
-    max_dark_candidates: int
+    max_dark_candidates: ClassVar[int]
     """Number of candidates without light after which a place is taken as dark."""
 
-    def __init__(
-        self,
-        capture: Capture,
-        majorant: Majorant,
-        ambient: np.ndarray,
-        image_cells: ImageCells | None = None,
-        below: Majorant | None = None,
-    ) -> None:
-        self.capture, self.majorant, self.ambient = capture, majorant, ambient
-        self.image_cells, self.below = image_cells, below
+    def __post_init__(self) -> None:
+        majorant = self.majorant
         bound = majorant.bound * (majorant.side_px**2 / 4)[:, None]
-        if below is not None:
-            bound *= majorant.is_above(below)[:, None]
-        self.colours = colour_cells(capture.cfa).ravel()
-        self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in capture.cell_groups]
+        if self.below is not None:
+            bound *= majorant.is_above(self.below)[:, None]
+        self.colours = colour_cells(self.capture.cfa).ravel()
+        self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in self.capture.cell_groups]
         self.mass = np.array([sums[-1] for sums in self.running])
 
     @abstractmethod
@@ -166,4 +310,4 @@ class CandidateSampler(ABC):
         if wrong.size:
             k, l, row, col = (int(np.array(part)[wrong[0]]) for part in candidates[:4])
             scene, number = self.capture.render_scene, int(object_id[wrong[0]])
-            raise InputError(not_finite(scene, number, (k, l), (row, col), self.capture.grid))
+            raise InputError(scene.not_finite(number, (k, l), (row, col), self.capture.grid))

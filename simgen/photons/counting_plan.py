@@ -20,9 +20,8 @@ from pcii.base import InputError
 from pcii.types import sense
 from simgen.base import random_streams as seeds
 from simgen.photons.bright_light import LEAST_SHARE, BrightLight, lit_light, mirrored_light, straight_light
-from simgen.photons.capture import Capture
-from simgen.photons.exploration import Plan, explore
-from simgen.photons.pilot import sampler_of_films
+from simgen.photons.candidates import EXPLORATION_SEED, Capture
+from simgen.photons.exploration import Plan, explore, sampler_of_films
 from simgen.photons.thinning import MAX_SINGLE_PHOTONS
 from simgen.renderer import render_view
 from simgen.spec import MOST_PATHS
@@ -33,9 +32,6 @@ PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST = 77.0, 0.3
 """The same without a compiled backend."""
 UNBOUNDED = "rare light paths, as by mirrors, are too bright for single photons"
-PROBE_SEED = 0
-"""The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
-nothing else are made alike: all with the origins of photons or all without."""
 DEPTH_STEPS = 64
 """Depths are rounded to equal steps of disparity, this many up to the nearest."""
 MAX_THINNED_PHOTONS = 1e10
@@ -98,8 +94,7 @@ def probe(capture: Capture, seed: int, known_rows: Sequence[BrightLight] = ()) -
     it, `known_rows`, whichever has more noise: light that fills n pixels with the radiance L adds n L to the
     sum over the pixels, and n L^2 to the variance.
     """
-    grid = capture.grid
-    small, pixels = replace(capture.coarse_grid, rows=1, cols=1), grid.height * grid.width
+    small, pixels = replace(capture.coarse_grid, rows=1, cols=1), capture.pixels
 
     def mosaic(part: int) -> np.ndarray:
         view_seed = seeds.integer(seed, stage="plan probe", part=part)
@@ -140,9 +135,9 @@ def plan_counts(
     each needs, which are more the more light there is. A probe of the light tells how many, unless a budget
     is so small that one sample for each pixel takes longer than all its photons. What is to be thinned is
     explored first, if it `may_explore` (memory may not suffice), and rendered where the light has no bound.
-    The seed has no part in it (see `PROBE_SEED`). `kind` is that of the backend; views that are rendered in
-    any case have `min_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and
-    for more photons than can be made in either way.
+    The seed has no part in it. `kind` is that of the backend; views that are rendered in any case have
+    `min_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and for more photons
+    than can be made in either way.
     """
     budget, why_rendered = capture.budget_per_view, capture.render_scene.why_rendered
     is_small = budget is not None and _are_few(capture, budget) and _thins(capture, kind, budget, min_samples)
@@ -163,7 +158,7 @@ def _thins(capture: Capture, kind: str, photons: float, samples: int) -> bool:
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
-    return photon_cost * photons <= (sample_cost * samples + PIXEL_COST) * _pixels(capture)
+    return photon_cost * photons <= (sample_cost * samples + PIXEL_COST) * capture.pixels
 
 
 def _are_few(capture: Capture, photons: float) -> bool:
@@ -171,17 +166,18 @@ def _are_few(capture: Capture, photons: float) -> bool:
     return photons * capture.grid.view_count <= MAX_SINGLE_PHOTONS
 
 
-def _pixels(capture: Capture) -> int:
-    return capture.grid.height * capture.grid.width
-
-
 def _plan_by_probe(
     capture: Capture, kind: str, min_samples: int, why_rendered: str, bright_light: Sequence[BrightLight] = ()
 ) -> Plan:
     """The cheaper way, or with a reason `why_rendered` the dense one; see `probe` for `bright_light`."""
-    probed = probe(capture, PROBE_SEED, bright_light)
-    pixels, views = _pixels(capture), capture.grid.view_count
-    photons, gain = _photons_and_gain(capture, probed)
+    probed = probe(capture, EXPLORATION_SEED, bright_light)
+    pixels, views = capture.pixels, capture.grid.view_count
+    photons, gain = capture.budget_per_view, capture.photons_per_radiance
+    if photons is None:
+        assert gain is not None
+        photons = gain * probed.mean * pixels
+    else:
+        gain = photons / (pixels * probed.mean) if probed.mean > 0 else 0.0
     samples = max(probed.samples_for(gain, capture.budget_pixels), min_samples)
     if capture.photons.nested and not _are_few(capture, photons):
         raise InputError(
@@ -213,15 +209,6 @@ def _plan_by_probe(
         depths_mm=_few_depths_mm(capture.coarse_z_mm) if thins else (),
         bright_light=tuple(row for row in probed.bright_light if row.light >= least_light),
     )
-
-
-def _photons_and_gain(capture: Capture, probed: Probe) -> tuple[float, float]:
-    """Photons of a view and those that a pixel catches of a unit of radiance, as seen from the centre."""
-    if capture.photons_per_radiance is not None:
-        return capture.photons_per_radiance * probed.mean * _pixels(capture), capture.photons_per_radiance
-    budget = capture.budget_per_view
-    assert budget is not None
-    return budget, budget / (_pixels(capture) * probed.mean) if probed.mean > 0 else 0.0
 
 
 def _few_depths_mm(z_mm: np.ndarray) -> tuple[float, ...]:

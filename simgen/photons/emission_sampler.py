@@ -1,14 +1,24 @@
 """Candidates of photons that come straight from something that shines, drawn on its surface.
 
 What shines has a known place, so no search finds it and none can miss it. A candidate is a point of the
-surface, drawn with the bound of its piece (see `shining_pieces`), and a camera; it is kept with probability
-sent / bound if it falls on the film and nothing stands in between. By the mapping theorem the kept ones are a
-Poisson process on the film whose rate is the radiance of the surface where it is seen: a lamp of a thousandth
-of a pixel gets its photons as a window of a million does. Paths through the film leave this light out
-(`path_tracing.radiance_along`).
+surface, drawn with the bound of its piece, and a camera; it is kept with probability sent / bound if it falls
+on the film and nothing stands in between. By the mapping theorem the kept ones are a Poisson process on the
+film whose rate is the radiance of the surface where it is seen: a lamp of a thousandth of a pixel gets its
+photons as a window of a million does. Paths through the film leave this light out
+(`PathTracer.radiance_along`).
+
+A point P of a surface with the normal n, which a camera at C sees at depth z, fills the film per mm^2 of
+surface with (f / pixel)^2 n.(C - P) / z^3 px, so a piece of the radiance L sends the film at most
+
+    L (f / pixel)^2 max n.(C - P) / min z^3
+
+per mm^2 (the product of both sides' cosines over the squared distance, in film coordinates). The bound is
+rigorous: it holds for every point of the piece and every camera, however small or bright the piece is. Pieces
+whose bound is much above what they send, because of their depth, their picture or the border of the film, are
+halved until they matter no more; what no camera can see is left out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,16 +26,197 @@ import numpy as np
 
 from pcii.base import LUMINANCE
 from pcii.types import colour_cells
-from simgen.cameras import Rig
-from simgen.photons.candidates import Accepted, is_on_film, nothing
-from simgen.photons.capture import Capture
-from simgen.photons.shining_pieces import pieces_in_view
-from simgen.renderer import ShiningSurface, standing_before
+from simgen.cameras import Rig, as_rig, corners
+from simgen.photons.candidates import Capture, is_of_group, is_on_film
+from simgen.renderer import ShiningSurface
 from simgen.sensor import PhotonTable
 
+NEAREST_MM = 1e-3
+"""What shines nearer to a camera than this is taken to be this far away."""
+LOOSE = 1.3
+"""A piece is halved if its bound is more than this factor above what one of its points sends."""
+FINE_SHARE = 1 / 2048
+"""But not if it has less than this share of the whole; smaller shares cost time here and save candidates."""
+MOST_PIECES = 1 << 14
+"""No piece is halved where there are this many."""
+SLIVER = 1e-6
+"""A triangle whose height is a smaller share of its longest side has no area: its normal is mere rounding."""
+ROUNDING = 1 + 1e-9
+"""The bound is raised by this factor, above the rounding of what it is compared with."""
 SHADOW_EPSILON = 1e-5
 """Of the distance: what stands nearer than this before a shining point does not hide it. Single precision
 errs by a hundredth of it."""
+
+
+class Pieces(NamedTuple):
+    """Flat triangles (P, 3, 3) in mm, the surface that each belongs to, and its bound in radiance px / mm^2.
+
+    `texcoords` (P, 3, 2) are 0 where the surface has no picture. Of a ball `height_mm` is the distance of
+    the triangle's plane from its centre; 0 for what is flat.
+    """
+
+    surface: np.ndarray
+    corners_mm: np.ndarray
+    texcoords: np.ndarray
+    height_mm: np.ndarray
+    bound: np.ndarray
+
+    @property
+    def area_mm2(self) -> np.ndarray:
+        """Area of each, (P,)."""
+        return np.linalg.norm(_across(self.corners_mm), axis=1) / 2
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normals (P, 3) of the triangles."""
+        across = _across(self.corners_mm)
+        return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+    def take(self, which: np.ndarray) -> "Pieces":
+        """Some of them, by mask or index."""
+        return Pieces(*(column[which] for column in self))
+
+
+def pieces_in_view(surfaces: Sequence[ShiningSurface], rig: Rig) -> Pieces:
+    """All pieces that a camera may see; there may be none."""
+    pieces, is_loose = _bounded(_whole(surfaces), surfaces, rig)
+    while True:
+        sent = pieces.bound * pieces.area_mm2
+        halved = is_loose & (sent > FINE_SHARE * sent.sum())
+        if not halved.any() or sent.size + halved.sum() > MOST_PIECES:
+            return pieces
+        halves, are_loose = _bounded(_halves(pieces.take(halved)), surfaces, rig)
+        pieces = _joined([pieces.take(~halved), halves])
+        is_loose = np.concatenate([is_loose[~halved], are_loose])
+
+
+def _whole(surfaces: Sequence[ShiningSurface]) -> Pieces:
+    """The surfaces' own triangles but for those without area; bounds are not known yet."""
+    parts = []
+    for number, one in enumerate(surfaces):
+        corners_mm = one.corners_mm.astype(np.float64)
+        twice_mm2 = np.linalg.norm(_across(corners_mm), axis=1)
+        has_area = twice_mm2 > SLIVER * _sides_mm(corners_mm).max(axis=1) ** 2
+        count, texcoords = int(has_area.sum()), one.texcoords
+        texcoords = np.zeros((count, 3, 2)) if texcoords is None else texcoords[has_area]
+        zero = np.zeros(count)
+        part = Pieces(np.full(count, number), corners_mm[has_area], texcoords, zero, zero)
+        if one.ball is not None:
+            height_mm = ((part.corners_mm[:, 0] - one.ball[0]) * part.normal).sum(axis=1)
+            part = part._replace(height_mm=height_mm)
+        parts.append(part)
+    return _joined(parts)
+
+
+def _bounded(pieces: Pieces, surfaces: Sequence[ShiningSurface], rig: Rig) -> tuple[Pieces, np.ndarray]:
+    """The pieces that may be seen, with their bounds, and whether each is much above what the piece sends."""
+    count, normal = pieces.surface.size, pieces.normal
+    balls = [(np.zeros(3), 0.0) if one.ball is None else one.ball[:2] for one in surfaces]
+    centre_mm, radius_mm = (np.array(column)[pieces.surface] for column in zip(*balls, strict=True))
+    is_round = radius_mm > 0
+    # How far the surface bulges out of its triangle, and how much more area it has at most.
+    bulge_mm = np.where(is_round, radius_mm - pieces.height_mm, 0)
+    stretch = np.where(is_round, radius_mm / np.where(is_round, pieces.height_mm, 1), 1) ** 2
+    outwards = (pieces.corners_mm - centre_mm[:, None]) / np.where(is_round, radius_mm, 1)[:, None, None]
+    turned = np.where(is_round, np.linalg.norm(outwards - normal[:, None], axis=2).max(axis=1), 0)
+
+    # Over all cameras: each corner's place before the camera, and how far above the surface the camera is.
+    low_mm, high_mm = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    low_px, high_px = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    above_mm, least_above_mm = np.full(count, -np.inf), np.full(count, np.inf)
+    grid = rig.grid
+    scale_px, widest = grid.focal_mm / grid.pixel_mm, np.zeros(2)
+    size_px = np.array([grid.width, grid.height])
+    for k, l in _extreme_cameras(rig):
+        place_mm, axis_px = rig.position_mm[k, l], rig.axis_px[k, l]
+        before_mm = (pieces.corners_mm - place_mm) @ rig.rotation[k, l]
+        low_mm = np.minimum(low_mm, before_mm.min(axis=1))
+        high_mm = np.maximum(high_mm, before_mm.max(axis=1))
+        film_px = before_mm[..., :2] / np.maximum(before_mm[..., 2:], NEAREST_MM) * scale_px + axis_px
+        low_px, high_px = np.minimum(low_px, film_px.min(axis=1)), np.maximum(high_px, film_px.max(axis=1))
+        widest = np.maximum(widest, np.maximum(axis_px + 0.5, size_px - 0.5 - axis_px) / scale_px)
+        # n.(C - P) is the same all over a flat piece; on a ball it is n.(C - centre) - radius.
+        flat_mm = ((place_mm - pieces.corners_mm[:, 0]) * normal).sum(axis=1)
+        round_mm = ((place_mm - centre_mm) * normal).sum(axis=1) - radius_mm
+        spread_mm = turned * np.linalg.norm(place_mm - centre_mm, axis=1)
+        above_mm = np.maximum(above_mm, np.where(is_round, round_mm + spread_mm, flat_mm))
+        least_above_mm = np.minimum(least_above_mm, np.where(is_round, round_mm - spread_mm, flat_mm))
+    low_mm, high_mm = low_mm - bulge_mm[:, None], high_mm + bulge_mm[:, None]
+    aperture_mm, per_focus = 0.0, 0.0
+    if rig.lens is not None:
+        aperture_mm, per_focus = rig.lens.aperture_mm / 2, rig.lens.aperture_mm / 2 / rig.lens.focus_mm
+    # What is seen at the side of the film is at least as far ahead as the film's widest slope allows.
+    aside_mm = np.maximum(np.maximum(low_mm, -high_mm)[:, :2] - aperture_mm, 0) / (widest + per_focus)
+    nearest_mm = np.maximum(np.maximum(low_mm[:, 2], NEAREST_MM), aside_mm.max(axis=1))
+    farthest_mm = high_mm[:, 2]
+    is_cut = low_mm[:, 2] <= NEAREST_MM
+    blur_px = scale_px * ((bulge_mm + aperture_mm) / nearest_mm + per_focus)[:, None]
+    low_px = np.where(is_cut[:, None], -np.inf, low_px - blur_px)
+    high_px = np.where(is_cut[:, None], np.inf, high_px + blur_px)
+    is_seen = (farthest_mm >= nearest_mm) & (above_mm + aperture_mm > 0)
+    is_seen &= ((high_px > -0.5) & (low_px < size_px - 0.5)).all(axis=1)
+    sent = np.where(is_seen, (above_mm + aperture_mm) / nearest_mm**3, 0)
+    is_loose = sent > LOOSE * np.maximum(least_above_mm, 0) / np.maximum(farthest_mm, nearest_mm) ** 3
+    is_loose |= ((low_px < -0.5) | (high_px > size_px - 0.5)).any(axis=1)
+    brightest, is_uneven = _brightest(pieces, surfaces)
+    bound = ROUNDING * scale_px**2 * sent * stretch * brightest
+    return pieces._replace(bound=bound).take(bound > 0), (is_loose | is_uneven)[bound > 0]
+
+
+def _brightest(pieces: Pieces, surfaces: Sequence[ShiningSurface]) -> tuple[np.ndarray, np.ndarray]:
+    """Radiance (P,) in its brightest colour at most, and whether parts of the piece have much less."""
+    brightest, is_uneven = np.empty(pieces.surface.size), np.zeros(pieces.surface.size, dtype=bool)
+    for number, one in enumerate(surfaces):
+        here, picture = np.flatnonzero(pieces.surface == number), one.picture
+        brightest[here] = one.radiance.max()
+        if picture is None:
+            continue
+        size = np.array(picture.shape[1::-1])
+        place_px = (pieces.texcoords[here] * [1, -1] + [0, 1]) * size - 0.5
+        # Two pixels more: linear interpolation takes the next one, and on a ball the picture is bent.
+        first = np.clip(np.floor(place_px.min(axis=1)) - 2, 0, size - 1).astype(np.int64)
+        last = np.clip(np.ceil(place_px.max(axis=1)) + 2, 0, size - 1).astype(np.int64)
+        for piece, (left, top), (right, bottom) in zip(here, first, last, strict=True):
+            part = picture[top : bottom + 1, left : right + 1]
+            highest = part.max()
+            brightest[piece] *= highest
+            is_uneven[piece] = highest > LOOSE * part.max(axis=-1).mean()
+    return brightest, is_uneven
+
+
+def _extreme_cameras(rig: Rig) -> list[tuple[int, int]]:
+    """Cameras between which all others stand: those at the corners, or all where errors move them."""
+    is_exact = np.array_equal(rig.position_mm, as_rig(rig.grid).position_mm)
+    is_exact &= bool((rig.rotation == np.eye(3)).all())
+    return corners(rig.grid) if is_exact else list(np.ndindex(rig.grid.rows, rig.grid.cols))
+
+
+def _halves(pieces: Pieces) -> Pieces:
+    """Each piece cut in two at the middle of its longest side."""
+    number = np.arange(pieces.surface.size)
+    order = (_sides_mm(pieces.corners_mm).argmax(axis=1)[:, None] + np.arange(3)) % 3
+
+    def cut(values: np.ndarray) -> np.ndarray:
+        """The first half keeps the side's first corner and the second its other one; both turn as before."""
+        first, second = values[number[:, None], order], values[number[:, None], order]
+        first[:, 1] = second[:, 0] = first[:, :2].mean(axis=1)
+        return np.concatenate([first, second])
+
+    halves = pieces.take(np.tile(number, 2))
+    return halves._replace(corners_mm=cut(pieces.corners_mm), texcoords=cut(pieces.texcoords))
+
+
+def _joined(parts: Sequence[Pieces]) -> Pieces:
+    return Pieces(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _sides_mm(corners_mm: np.ndarray) -> np.ndarray:
+    """Lengths (P, 3) of the triangles' sides, each from the corner of its number to the next."""
+    return np.linalg.norm(corners_mm - np.roll(corners_mm, -1, axis=1), axis=2)
+
+
+def _across(corners_mm: np.ndarray) -> np.ndarray:
+    return np.cross(corners_mm[:, 1] - corners_mm[:, 0], corners_mm[:, 2] - corners_mm[:, 0])
 
 
 class ShiningPoints(NamedTuple):
@@ -83,20 +274,18 @@ class EmissionSampler:
             self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
             self.mass = float(self.running[-1]) if self.running.size else 0.0
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`.
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons of a candidate for each of `group` (N,) on the film of `view` (N,), and whose each is.
 
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
         light = self.arriving(view, np.random.default_rng(seed))
-        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-        light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
+        light = light.take(is_of_group(cells, group[light.candidate], light.row, light.col))
         k, l = np.divmod(view[light.candidate], self.capture.grid.cols)
         origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
-        photons = PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin)
-        return nothing(self.capture.channels)._replace(photons=photons, candidate=light.candidate)
+        return PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin), light.candidate
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
         """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
@@ -109,9 +298,7 @@ class EmissionSampler:
         is_kept = chance[which] * points.bound < points.sent * radiance
         light = Arriving(which, row, col, points.surface, radiance, points.point_mm[:, 2]).take(is_kept)
         points = points.take(is_kept)
-        blocker = standing_before(
-            self.capture.render_scene, points.camera_mm, points.point_mm, SHADOW_EPSILON
-        )
+        blocker = self.capture.render_scene.standing_before(points.camera_mm, points.point_mm, SHADOW_EPSILON)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
         is_itself = self.is_ball[light.surface] & (blocker == self.numbers[light.surface])
         return light.take((blocker < 0) | is_itself)
@@ -146,8 +333,8 @@ class EmissionSampler:
             lens_point = rig.lens_points(rng.random((2, view.size)))
             camera_mm = camera_mm + np.einsum("nab,bn->na", rig.rotation[k, l][..., :2], lens_point)
         away_mm = point_mm - camera_mm
-        row_px, col_px, z_mm = film_px(rig, view, away_mm, lens_point)
-        sent = stretch * image_px_per_mm2(rig, normal, away_mm, z_mm)
+        row_px, col_px, z_mm = rig.film_px(view, away_mm, lens_point)
+        sent = stretch * rig.image_px_per_mm2(normal, away_mm, z_mm)
         points = surface, point_mm, camera_mm, texcoord, row_px, col_px
         return ShiningPoints(*points, sent, self.pieces.bound[piece])
 
@@ -159,32 +346,6 @@ class EmissionSampler:
                 here = points.surface == number
                 radiance[here] *= _between_pixels(one.picture, points.texcoord[here], one.ball is not None)
         return radiance
-
-
-def film_px(
-    rig: Rig, view: np.ndarray, away_mm: np.ndarray, lens_point: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Row and column on the films of `view` (N,), and planar depth in mm, of what a point of the lens sees.
-
-    `away_mm` (N, 3) is where that is from the point of the lens, (2, N) or (2, 1). NaN behind the camera.
-    """
-    k, l = np.divmod(view, rig.grid.cols)
-    x, y, z_mm = np.einsum("nba,nb->an", rig.rotation[k, l], away_mm)
-    z_mm = np.where(z_mm > 0, z_mm, np.nan)
-    if rig.lens is not None:
-        x, y = np.stack([x, y]) + lens_point * z_mm / rig.lens.focus_mm
-    scale_px, axis_px = rig.grid.focal_mm / rig.grid.pixel_mm, rig.axis_px[k, l]
-    return y / z_mm * scale_px + axis_px[:, 1], x / z_mm * scale_px + axis_px[:, 0], z_mm
-
-
-def image_px_per_mm2(rig: Rig, normal: np.ndarray, away_mm: np.ndarray, z_mm: np.ndarray) -> np.ndarray:
-    """Area (N,) of the image, in px^2, of each mm^2 of a surface of this unit `normal` (N, 3).
-
-    It is `away_mm` (N, 3) from the camera, at the planar depth `z_mm` (N,); 0 if it faces away, or if the
-    depth is NaN.
-    """
-    scale_px = rig.grid.focal_mm / rig.grid.pixel_mm
-    return np.nan_to_num(scale_px**2 * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3)
 
 
 def _surfaces_as_sensed(capture: Capture) -> Iterator[ShiningSurface]:

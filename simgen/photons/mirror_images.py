@@ -14,10 +14,9 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.cameras import Rig
-from simgen.photons.bright_light import SEED, BrightLight
-from simgen.photons.candidates import Accepted, FilmPoints, ImageCells, nothing
-from simgen.photons.capture import Capture
-from simgen.photons.emission_sampler import EmissionSampler, film_px
+from simgen.photons.bright_light import BrightLight
+from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, is_of_group
+from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
 
@@ -59,18 +58,13 @@ class MirrorImages:
         self.of_view = self.running[np.searchsorted(cells.number, first)]
         self.mass = float(np.diff(self.of_view).max())
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`.
-
-        `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
-        """
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons as of `EmissionSampler.draw`."""
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        is_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-        bayer = points.row.astype(np.int64) % 2 * 2 + points.col.astype(np.int64) % 2
-        here = is_of_group[group[candidate], bayer]
+        here = is_of_group(cells, group[candidate], points.row.astype(np.int64), points.col.astype(np.int64))
         points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
         radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
@@ -79,8 +73,7 @@ class MirrorImages:
         i, j = points.row.astype(np.int64), points.col.astype(np.int64)
         origin = {"object_id": object_id, "z_mm": z_mm}
         photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
-        accepted = nothing(self.sampler.capture.channels)
-        return accepted._replace(photons=photons, candidate=candidate.repeat(number))
+        return photons, candidate.repeat(number)
 
     def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
         """Light of a film, mean of all views, by the number of mirrors before it, of `number` candidates."""
@@ -118,10 +111,10 @@ class KnownPlaces:
         """Cells in which images of lamps are drawn, which paths through the film leave out."""
         return next((part.cells for part in self.parts if isinstance(part, MirrorImages)), None)
 
-    def try_candidates(
+    def draw(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> Accepted:
-        """Draw a candidate for each of `group` (N,) on the film of `view` (N,); see `CandidateSampler`."""
+    ) -> tuple[PhotonTable, np.ndarray]:
+        """Photons as of `EmissionSampler.draw`."""
         which = np.zeros(view.size, dtype=np.int64)
         if len(self.parts) > 1:
             rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
@@ -129,10 +122,10 @@ class KnownPlaces:
         tables, candidates = [no_photons()], [np.zeros(0, dtype=np.int64)]
         for number, part in enumerate(self.parts):
             here = np.flatnonzero(which == number)
-            accepted = part.try_candidates(group[here], view[here], cells, seed)
-            tables.append(accepted.photons)
-            candidates.append(here[accepted.candidate])
-        return nothing(1)._replace(photons=joined(tables), candidate=np.concatenate(candidates))
+            photons, candidate = part.draw(group[here], view[here], cells, seed)
+            tables.append(photons)
+            candidates.append(here[candidate])
+        return joined(tables), np.concatenate(candidates)
 
 
 def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> MirrorImages | None:
@@ -142,14 +135,14 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
 
     def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
-        seed = seeds.integer(SEED, stage="lamp rays", part=part)
+        seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
         if not points.view.size:
             return points, np.zeros(0)
         brought, *_ = sampler.trace_mirrored(points, above, seed)
         return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
 
     for number, light in enumerate(lights):
-        rng = seeds.generator(SEED, stage="lamp rays", part=number)
+        rng = seeds.generator(EXPLORATION_SEED, stage="lamp rays", part=number)
         first, brought = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
         if first.view.size:
             around = _evenly_by_pixel(first, MORE_PATHS, rng)
@@ -194,7 +187,7 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
     _, nearest = KDTree(arrivals.place_mm).query(at_mm, number)
     nearest = nearest.reshape(-1, number)
     away = np.concatenate([arrivals.slope, np.ones((arrivals.light.size, 1))], axis=1)
-    row, col, _ = film_px(capture.rig, views.repeat(number), away[nearest.ravel()], np.zeros((2, 1)))
+    row, col, _ = capture.rig.film_px(views.repeat(number), away[nearest.ravel()])
     seen_px = np.stack([row, col], axis=1).reshape(-1, number, 2)
     aside_mm = arrivals.place_mm[nearest] - at_mm[:, None]
     design = np.concatenate([np.ones((*aside_mm.shape[:2], 1)), aside_mm], axis=2)

@@ -11,8 +11,8 @@ import numpy as np
 
 from pcii.base import LUMINANCE
 from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film
-from simgen.photons.disparity_layers import Samples
-from simgen.renderer import objects_by_shape, rows_of
+from simgen.photons.majorant import Samples
+from simgen.renderer import rows_of
 from simgen.sensor import PhotonTable
 
 PATHS = 4
@@ -105,7 +105,7 @@ class ScalarSampler(CandidateSampler):
     def _first_hits(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
         render_scene, intersect = self.capture.render_scene, self.capture.render_scene.scene.ray_intersect
-        ids, size = objects_by_shape(render_scene), candidates.k.size
+        ids, size = render_scene.objects_by_shape(), candidates.k.size
         object_id, z_mm = np.zeros(size, np.int16), np.full(size, np.inf, np.float32)
         for number, ray in enumerate(self._rays(candidates)):
             hit = intersect(ray)

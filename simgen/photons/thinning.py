@@ -25,13 +25,10 @@ import numpy as np
 
 from pcii.base import InputError, Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler
-from simgen.photons.capture import Capture, ranks_in_scopes
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore
-from simgen.photons.majorant import Majorant
+from simgen.photons.candidates import CandidateSampler, Capture, ranks_in_scopes
+from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore, sampler_class
+from simgen.photons.majorant import Samples
 from simgen.photons.mirror_images import KnownPlaces
-from simgen.photons.pilot import sampler_class
 from simgen.sensor import PhotonTable, joined, no_photons
 
 WAVEFRONT = 1 << 21
@@ -59,7 +56,10 @@ def thin_photons(
     if plan is None or plan.known_places is None:
         plan = explore(capture, plan)
     drawing = _Drawing(capture, plan, report)
-    table = drawing.draw_one_by_one() if plan.keeps_origins else drawing.draw_counts()
+    if plan.keeps_origins:
+        table = drawing.draw(drawing.totals, capture.photons_per_radiance)
+    else:
+        table = drawing.draw_counts()
     return table.by_pixel(capture.grid), drawing.log()
 
 
@@ -108,11 +108,7 @@ class _Drawing:
         self.majorant = None if plan.majorant is None else plan.majorant.copy()
         self.tally = Counter(paths=plan.paths)
 
-    def draw_one_by_one(self) -> PhotonTable:
-        """A row for each photon."""
-        return self._draw(self.totals, self.capture.photons_per_radiance)
-
-    def _draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
+    def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
         """Every photon one by one: of the exposure `gain`, or without one as many as each scope wants."""
         photons = _Photons(wanted)
         if self.majorant is not None or self.known_places.mass:
@@ -140,9 +136,9 @@ class _Drawing:
         parts = int(np.ceil(expected / (MAX_SINGLE_PHOTONS / 4)))
         for part in range(parts):
             if gain is not None:
-                photons = self._draw(wanted, gain / parts)
+                photons = self.draw(wanted, gain / parts)
             else:
-                photons = self._draw(wanted * (part + 1) // parts - wanted * part // parts, None)
+                photons = self.draw(wanted * (part + 1) // parts - wanted * part // parts, None)
             np.add.at(total, photons.flat_pixels(grid), 1)
             self.report("parts of the photons", part + 1, parts)
         pixel = np.flatnonzero(total)
@@ -182,7 +178,10 @@ class _Drawing:
                 if not some.size:
                     break
                 missing = wanted[some] - photons.number[some]
-                candidates = candidates_needed(missing, round_number, self.kept_share)
+                # About what is missing at first, then enough to be done; no more than fit a wavefront.
+                aim = missing if round_number == 0 else missing + 3.5 * np.sqrt(missing) + 4
+                most = max(WAVEFRONT // missing.size, 16)
+                candidates = np.clip(aim / self.kept_share, 16, most).astype(np.int64)
                 time = candidates / self._mass(sampler)[self.capture.group_of_scope[some]]
                 self._round(photons, sampler, some, photons.time[some], time, emits=True)
                 photons.time[some] += time
@@ -209,7 +208,7 @@ class _Drawing:
             self.tally.update(raises=1, exceeding=exceeding.k.size)
             below, before = self.majorant.copy(), max(self.tally["candidates"], WAVEFRONT)
             self.majorant.raise_bounds(exceeding, reach=raises)
-            sampler = self._sampler(self.majorant, below)
+            sampler = self.plan.sampler(self.capture, self.majorant, below)
             expected = photons.time * sampler.mass[self.capture.group_of_scope]
             if raises > MAX_RAISES or expected.sum() > MAX_EXTRA_RATIO * before:
                 raise InputError(
@@ -222,12 +221,8 @@ class _Drawing:
                 self._round(photons, sampler, some, np.zeros(some.size), photons.time[some])
             self.report("photons above the raised bound", raises, raises)
 
-    def _sampler(self, majorant: Majorant, below: Majorant | None = None) -> CandidateSampler:
-        kind, plan = sampler_class(self.capture), self.plan
-        return kind(self.capture, majorant, plan.ambient, plan.image_cells, below)
-
     def _film_sampler(self) -> CandidateSampler | None:
-        return None if self.majorant is None else self._sampler(self.majorant)
+        return None if self.majorant is None else self.plan.sampler(self.capture, self.majorant)
 
     def _mass(self, sampler: CandidateSampler | None) -> np.ndarray:
         """Candidates of each group (G,) in one view and unit of time, of films and of what shines."""
@@ -250,13 +245,12 @@ class _Drawing:
         capture, known, tally = self.capture, self.known_places, self.tally
         candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
-        def add(part: Accepted, number: np.ndarray, paths: int) -> None:
-            of_scope = np.arange(some.size).repeat(number)[part.candidate]
+        def add(table: PhotonTable, candidate: np.ndarray, number: np.ndarray, paths: int) -> None:
+            of_scope = np.arange(some.size).repeat(number)[candidate]
             time = begin[of_scope] + duration[of_scope] * rng.random(of_scope.size)
-            photons.add(part.photons, some[of_scope], time)
-            photons.exceeding.append(part.exceeding)
+            photons.add(table, some[of_scope], time)
             photons.tried[some] += number
-            tally.update(candidates=int(number.sum()), followed=part.ratio.size, paths=paths)
+            tally.update(candidates=int(number.sum()), paths=paths)
 
         if sampler is not None:
             number = rng.poisson(duration * sampler.mass[capture.group_of_scope[some]])
@@ -264,7 +258,9 @@ class _Drawing:
             view = None if capture.has_one_budget else capture.view_of_scope[scope]
             path_seed = seeds.integer(stage="candidate paths", **numbers)
             part = sampler.try_candidates(capture.group_of_scope[scope], view, path_seed)
-            add(part, number, sampler.count_paths(scope.size, part.ratio.size))
+            add(part.photons, part.candidate, number, sampler.count_paths(scope.size, part.ratio.size))
+            photons.exceeding.append(part.exceeding)
+            tally.update(followed=part.ratio.size)
         if emits and known.mass:
             number = rng.poisson(duration * known.mass)
             scope = some.repeat(number)
@@ -272,8 +268,8 @@ class _Drawing:
             if capture.has_one_budget:
                 view = rng.integers(0, self.capture.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            part = known.try_candidates(capture.group_of_scope[scope], view, capture.cell_groups, path_seed)
-            add(part, number, scope.size)
+            drawn = known.draw(capture.group_of_scope[scope], view, capture.cell_groups, path_seed)
+            add(*drawn, number, scope.size)
         tally["rounds"] += 1
         if emits:
             candidates = max(tally["candidates"] - candidates_before, 1)
@@ -283,12 +279,3 @@ class _Drawing:
 def _split(scopes: np.ndarray, block: np.ndarray) -> list[np.ndarray]:
     """Scopes (N,) in runs of the same number of `block` (N,)."""
     return np.split(scopes, np.flatnonzero(np.diff(block)) + 1)
-
-
-def candidates_needed(missing: np.ndarray, round_number: int, kept_share: float) -> np.ndarray:
-    """How many to draw for each scope: about what is missing at first, then enough to be done.
-
-    Together never more than fit a wavefront.
-    """
-    aim = missing if round_number == 0 else missing + 3.5 * np.sqrt(missing) + 4
-    return np.clip(aim / kept_share, 16, max(WAVEFRONT // missing.size, 16)).astype(np.int64)

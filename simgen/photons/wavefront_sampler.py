@@ -3,36 +3,23 @@
 What leaves is NumPy.
 """
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from simgen.photons.candidates import (
-    Accepted,
-    Candidates,
-    CandidateSampler,
-    FilmPoints,
-    ImageCells,
-    is_on_film,
-    nothing,
-)
-from simgen.photons.capture import Capture
-from simgen.photons.disparity_layers import Samples
-from simgen.photons.majorant import NEXT_LAYERS, Majorant
+from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film, nothing
+from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.renderer import (
     FirstHits,
+    PathTracer,
     RandomNumbers,
     doubles,
     film_rays,
     floats,
     gathered,
-    hit_first,
     light_of,
     load_drjit,
-    mirrored_radiance,
-    of_colour,
     opaque,
-    radiance_along,
     signed,
     streams_for,
     unsigned,
@@ -41,6 +28,7 @@ from simgen.renderer import (
 from simgen.sensor import PhotonTable
 
 LEAST_GUESS = 1e-30
+Rows = TypeVar("Rows", Candidates, FirstHits)
 
 
 class WavefrontSampler(CandidateSampler):
@@ -53,20 +41,15 @@ class WavefrontSampler(CandidateSampler):
 
     paths_each, max_dark_candidates = 1, 1 << 20
 
-    def __init__(
-        self,
-        capture: Capture,
-        majorant: Majorant,
-        ambient: np.ndarray,
-        image_cells: ImageCells | None = None,
-        below: Majorant | None = None,
-    ) -> None:
-        super().__init__(capture, majorant, ambient, image_cells, below)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        capture, majorant = self.capture, self.majorant
         self.mi = mi = capture.render_scene.mi
         self.dr, self.light = load_drjit(), light_of(capture.render_scene, capture.cfa)
+        self.tracer = PathTracer(capture.render_scene)
         # Numbers that change from pilot to pilot are passed as data: as constants they would be
         # compiled into the kernel, and each pilot would wait for its own.
-        self.opaque_ambient = [opaque(mi.Float, part) for part in ambient]
+        self.opaque_ambient = [opaque(mi.Float, part) for part in self.ambient]
         sizes = np.array([sums.size for sums in self.running])
         ends = np.cumsum(sizes)
         self.start, self.stop = unsigned(mi, ends - sizes), unsigned(mi, ends - 1)
@@ -80,7 +63,7 @@ class WavefrontSampler(CandidateSampler):
         self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in tiles)
         self.dim, self.bounds = floats(mi, majorant.dim), self._upload_bounds(majorant)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
-        self.bounds_below = self._upload_bounds(below)
+        self.bounds_below = self._upload_bounds(self.below)
         layers = majorant.layers
         self.layer_at = signed(mi, layers.layer_at)
         self.nearness_mm = opaque(mi.Float, layers.disparity_mm / layers.step_px)
@@ -109,7 +92,7 @@ class WavefrontSampler(CandidateSampler):
         rest = dr.compress(promising)
         if len(rest) == 0:
             return nothing(capture.channels)
-        candidates, first = _take(candidates, rest), _take_hits(first, rest)
+        candidates, first = _take(candidates, rest), _take(first, rest)
         light = self._follow(candidates, first, seed, 0)
         most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
         radiance = self._in_own_colour(light, candidates)
@@ -117,7 +100,7 @@ class WavefrontSampler(CandidateSampler):
         ratio = radiance / most
         dr.eval(is_kept, ratio)
         accepted, over = dr.compress(is_kept), dr.compress(ratio > 1)
-        photon, hit = _take(candidates, accepted), _take_hits(first, accepted)
+        photon, hit = _take(candidates, accepted), _take(first, accepted)
         candidate = dr.gather(mi.UInt32, rest, accepted)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
         self._require_finite(ratio, candidates, first)
@@ -139,7 +122,7 @@ class WavefrontSampler(CandidateSampler):
         for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):
             recoloured = candidates._replace(colour=colour)
             first = self._hit_first(recoloured)
-            followed, first_of_followed = _take(recoloured, some), _take_hits(first, some)
+            followed, first_of_followed = _take(recoloured, some), _take(first, some)
             radiance = self._follow(followed, first_of_followed, seed, turn)
             self._require_finite(dr.sum(radiance), followed, first_of_followed)
             guess = [a + b for a, b in zip(guess, self._per_colour(first.guess, recoloured), strict=True)]
@@ -159,10 +142,10 @@ class WavefrontSampler(CandidateSampler):
         mi, capture = self.mi, self.capture
         candidates = self._at(streams_for(mi, seed, points.view.size), points)
         first = self._hit_first(candidates)
-        self.dr.make_opaque(*candidates, vars(first))
+        self.dr.make_opaque(*candidates, *first)
         sampler = streams_for(mi, seed, points.view.size, part=1)
         path = self._rays(candidates), first.record, sampler, opaque(mi.Float, above)
-        light, bounces = mirrored_radiance(capture.render_scene, *path)
+        light, bounces = self.tracer.mirrored_radiance(*path)
         radiance = self._in_own_colour(light, candidates)
         self.dr.eval(radiance, bounces)
         object_id = capture.render_scene.object_of_shape[np.array(first.shape)]
@@ -275,17 +258,17 @@ class WavefrontSampler(CandidateSampler):
     def _hit_first(self, candidates: Candidates) -> FirstHits:
         self.dr.make_opaque(*candidates)
         ambient = self.light.spread(self.opaque_ambient, candidates.colour, candidates.wavelength_sample)
-        first = hit_first(self.capture.render_scene, self._rays(candidates), candidates.inside, ambient)
-        self.dr.eval(vars(first))
+        first = self.tracer.hit_first(self._rays(candidates), candidates.inside, ambient)
+        self.dr.eval(*first)
         return first
 
     def _follow(self, candidates: Candidates, first: FirstHits, seed: int, turn: int) -> Any:
         """Radiance along one path from each first hit, as rays carry it; each `turn` has other numbers."""
-        self.dr.make_opaque(*candidates, vars(first))
+        self.dr.make_opaque(*candidates, *first)
         # Not the candidates' numbers, which decided which of them are followed.
         sampler = streams_for(self.mi, seed, len(candidates.k), part=1 + turn)
         rays, left_out = self._rays(candidates), self._left_out(candidates)
-        light = radiance_along(self.capture.render_scene, rays, first.record, sampler, left_out)
+        light = self.tracer.radiance_along(rays, first.record, sampler, left_out)
         self.dr.eval(light)
         return light
 
@@ -325,22 +308,19 @@ class WavefrontSampler(CandidateSampler):
 
     def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
         """What each candidate's pixel gets of radiance that rays carry."""
-        return of_colour(self._per_colour(radiance, candidates), candidates.colour)
+        return self.light.in_own_colour(radiance, candidates.colour, candidates.wavelength_sample)
 
     def _exceeding(self, candidates: Candidates, first: FirstHits, light: Any, over: Any) -> Samples:
-        candidates, first = _take(candidates, over), _take_hits(first, over)
+        candidates, first = _take(candidates, over), _take(first, over)
         both = first.guess, gathered(light, over)
         guess, light_over = (self._per_colour(radiance, candidates) for radiance in both)
         self.dr.eval(*candidates, first.z_mm, guess, light_over)
         return _samples(candidates, first.z_mm, guess, light_over)
 
 
-def _take(candidates: Candidates, index: Any) -> Candidates:
-    return Candidates(*(None if array is None else gathered(array, index) for array in candidates))
-
-
-def _take_hits(first: FirstHits, index: Any) -> FirstHits:
-    return FirstHits(*(gathered(array, index) for array in vars(first).values()))
+def _take(rows: Rows, index: Any) -> Rows:
+    """Some of them, by index."""
+    return type(rows)(*(None if array is None else gathered(array, index) for array in rows))
 
 
 def _samples(candidates: Candidates, z_mm: Any, guess: list[Any], light: list[Any]) -> Samples:

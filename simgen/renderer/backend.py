@@ -80,7 +80,7 @@ def choose() -> Backend:
     request = os.environ.get("SIMGEN_BACKEND", "").strip().lower()
     if request not in ("", *VARIANTS):
         raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(VARIANTS)}, not {request!r}")
-    failures: list[str] = []
+    failures = list[str]()
     for candidate in _candidates(request):
         if candidate.works:
             return candidate
@@ -139,20 +139,17 @@ def _mitsuba() -> Any:
         # Dr.Jit reads it once, when it first needs LLVM.
         os.environ["DRJIT_LIBLLVM_PATH"] = choice.library
     with _uninterrupted():
-        import mitsuba as mi
+        import mitsuba
 
-    _trust_own_files_alone(mi)
+    mi: Any = mitsuba
+    # Plugins, which Mitsuba runs, are looked for in its package alone, not in the working directory.
+    mi.file_resolver().clear()
+    mi.file_resolver().append(str(Path(mi.__file__).parent))
     if (threads := threads_of_worker()) is not None:
         import drjit as dr
 
         dr.set_thread_count(threads)
     return mi
-
-
-def _trust_own_files_alone(mi: Any) -> None:
-    """Let Mitsuba look for plugins, which it runs, in its package alone, not in the working directory."""
-    mi.file_resolver().clear()
-    mi.file_resolver().append(str(Path(mi.__file__).parent))
 
 
 @contextlib.contextmanager
@@ -251,16 +248,15 @@ def _candidates(request: str = "") -> Iterator[Backend]:
 
 def _trial(kind: str, library: str, name: str) -> Backend:
     """What the probe kernel showed in a subprocess, now or when libraries and devices were the same."""
-
-    def read(answer: dict[str, Any]) -> Backend:
-        detail = f"{name} {answer['detail']}"
-        return Backend(kind, VARIANTS[kind], library, bool(answer["works"]), detail)
-
     key = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
     if (driver := Path("/proc/driver/nvidia/version")).exists() and kind == "cuda":
         key += [driver.read_text(), os.environ.get("CUDA_VISIBLE_DEVICES", "")]
     if (path := Path(library).resolve()).exists():
         key += [str(path), str(path.stat().st_size), str(path.stat().st_mtime_ns)]
+
+    def read(answer: dict[str, Any]) -> Backend:
+        return Backend(kind, VARIANTS[kind], library, bool(answer["works"]), f"{name} {answer['detail']}")
+
     return cached("backend", key, lambda: _probe(kind, library), read)
 
 

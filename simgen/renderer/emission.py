@@ -9,13 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base import LUMINANCE, InputError
+from pcii.base import LUMINANCE, InputError, srgb_to_linear
 from simgen.assets import Assets, Triangles, bears_pictures_once, globe, surface_points, triangles_of
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
-from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
-from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
-from simgen.spec import Card, Scene, SceneObject, Sphere, lights
-from simgen.spectral import DAYLIGHT, Filters, integral
+from simgen.renderer.mitsuba_objects import (
+    WorldFrame,
+    check_texcoords,
+    linear_bitmap,
+    pose_of,
+    solid_parts,
+    spectrum_plugin,
+    texture_plugin,
+)
+from simgen.spec import Card, Illuminant, Scene, SceneObject, Sphere, lights
+from simgen.spectral import DAYLIGHT, Filters, integral, spectra
 
 NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
@@ -48,104 +55,192 @@ class ShiningSurface:
     ball: tuple[np.ndarray, float, np.ndarray] | None = None
 
 
-def shining_surfaces(
-    mi: Any, scene: Scene, assets: Assets, gain: float, filters: Filters | None
-) -> Iterator[ShiningSurface]:
-    """All that shines and can be seen: lamps with a surface, and objects."""
+class SceneLights:
+    """All that shines in a scene, as bright as its level says, and its emitters in the axes of `frame`.
 
-    def radiance(luminance_cd_m2: float, illuminant: lights.Illuminant) -> np.ndarray:
-        if filters is None:
-            return np.array(radiance_plugin(mi, gain * luminance_cd_m2, illuminant)["value"])
-        spectrum = gain * luminance_cd_m2 * light_spectrum(mi, illuminant)
-        return integral(filters.sensitivity * spectrum)
-
-    def corners_mm(mesh: Triangles, pose: np.ndarray) -> np.ndarray:
-        return (mesh.positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3])[mesh.faces]
-
-    for light in scene.lights:
-        if isinstance(light, lights.AreaLight):
-            pose = area_light_pose(light) * [1, -1, -1, 1]  # a card faces -Z, Mitsuba's rectangle +Z
-            corners = corners_mm(triangles_of(Card(width_mm=2.0, height_mm=2.0), {}), pose)
-            yield ShiningSurface(0, corners, radiance(light.luminance_cd_m2, light.illuminant))
-    for number, thing in enumerate(scene.objects, start=1):
-        emission, shape = thing.material.emission, thing.shape
-        if emission is None:
-            continue
-        pose = np.array(pose_of(mi, thing).matrix, dtype=np.float64)
-        triangles, ball = solid_parts(shape, thing.material, assets), None
-        if isinstance(shape, Sphere):
-            triangles, ball = globe(shape.radius_mm, BALL_ROWS), (pose[:3, 3], shape.radius_mm, pose[:3, :3])
-        own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
-        picture, texcoords = None, None
-        if emission.texture is not None:
-            assert triangles.texcoords is not None
-            own_radiance = np.full(3, gain * emission.luminance_cd_m2)
-            picture = assets.image(emission.texture)
-            texcoords = triangles.texcoords.astype(np.float64)[triangles.faces]
-        yield ShiningSurface(number, corners_mm(triangles, pose), own_radiance, picture, texcoords, ball)
-
-
-def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) -> dict[str, Any] | None:
-    """The emitter of an object that is `gain` times as bright as it says; None if it does not shine.
-
-    Raises `InputError` for a texture in spectral mode, and for one of which a pixel has no place or several:
-    such a lamp is aimed at by the brightness of its image.
+    `surroundings` (H, W, 3) are the image of what shines from all around, if there is one; a Mitsuba file's
+    lights send `referenced_lux` to the plane of the level. Raises `InputError` if that gets no light.
     """
-    emission, shape, where = thing.material.emission, thing.shape, "material.emission.texture"
-    if emission is None:
-        return None
-    luminance = gain * emission.luminance_cd_m2
-    if emission.texture is None:
-        return {"type": "area", "radiance": radiance_plugin(mi, luminance, emission.illuminant)}
+
+    def __init__(
+        self, mi: Any, scene: Scene, assets: Assets, frame: WorldFrame, referenced_lux: float
+    ) -> None:
+        self.mi, self.scene, self.assets, self.frame = mi, scene, assets, frame
+        around = scene.light_around
+        is_image = isinstance(around, lights.EnvironmentLight)
+        self.surroundings = assets.environments[around.file] if is_image else None
+        self.gain = self._level_gain(referenced_lux)
+
+    def surfaces(self, filters: Filters | None) -> Iterator[ShiningSurface]:
+        """All that shines and can be seen: lamps with a surface, and objects."""
+
+        def radiance(luminance_cd_m2: float, illuminant: Illuminant) -> np.ndarray:
+            if filters is None:
+                return np.array(_radiance_plugin(self.mi, self.gain * luminance_cd_m2, illuminant)["value"])
+            spectrum = self.gain * luminance_cd_m2 * light_spectrum(self.mi, illuminant)
+            return integral(filters.sensitivity * spectrum)
+
+        def corners_mm(mesh: Triangles, pose: np.ndarray) -> np.ndarray:
+            return (mesh.positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3])[mesh.faces]
+
+        for light in self.scene.lights:
+            if isinstance(light, lights.AreaLight):
+                pose = _area_light_pose(light) * [1, -1, -1, 1]  # a card faces -Z, Mitsuba's rectangle +Z
+                corners = corners_mm(triangles_of(Card(width_mm=2.0, height_mm=2.0), {}), pose)
+                yield ShiningSurface(0, corners, radiance(light.luminance_cd_m2, light.illuminant))
+        for number, thing in enumerate(self.scene.objects, start=1):
+            emission, shape = thing.material.emission, thing.shape
+            if emission is None:
+                continue
+            pose = np.array(pose_of(self.mi, thing).matrix, dtype=np.float64)
+            triangles, ball = solid_parts(shape, thing.material, self.assets), None
+            if isinstance(shape, Sphere):
+                triangles, ball = (
+                    globe(shape.radius_mm, BALL_ROWS),
+                    (pose[:3, 3], shape.radius_mm, pose[:3, :3]),
+                )
+            own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
+            picture, texcoords = None, None
+            if emission.texture is not None:
+                assert triangles.texcoords is not None
+                own_radiance = np.full(3, self.gain * emission.luminance_cd_m2)
+                picture = self.assets.image(emission.texture)
+                texcoords = triangles.texcoords.astype(np.float64)[triangles.faces]
+            yield ShiningSurface(number, corners_mm(triangles, pose), own_radiance, picture, texcoords, ball)
+
+    def object_plugin(self, thing: SceneObject) -> dict[str, Any] | None:
+        """The emitter of an object, None if it does not shine.
+
+        Raises `InputError` for a texture in spectral mode, and for one of which a pixel has no place or
+        several: such a lamp is aimed at by the brightness of its image.
+        """
+        emission, shape, where = thing.material.emission, thing.shape, "material.emission.texture"
+        if emission is None:
+            return None
+        luminance = self.gain * emission.luminance_cd_m2
+        if emission.texture is None:
+            return {"type": "area", "radiance": _radiance_plugin(self.mi, luminance, emission.illuminant)}
+        if is_spectral(self.mi):
+            raise InputError(f"{where}: images shine only in linear sRGB; leave it or sensor.camera out")
+        check_texcoords(where, shape, self.assets)
+        if not (
+            isinstance(shape, Card | Sphere) or bears_pictures_once(triangles_of(shape, self.assets.meshes))
+        ):
+            raise InputError(
+                f"{where}: the shape bears parts of the picture several times or reaches beyond it; use each "
+                "texture coordinate from 0 to 1 once"
+            )
+        pixels = self.assets.image(emission.texture) * np.float32(luminance)
+        return {"type": "area", "radiance": texture_plugin(self.mi, pixels, shape, raw=True)}
+
+    def light_plugin(self, light: lights.Light) -> dict[str, Any]:
+        """The Mitsuba emitter of a light."""
+        mi, gain, frame, T = self.mi, self.gain, self.frame, self.mi.ScalarTransform4f
+        per_cd = 1e6 * frame.unit**2  # cd = cd/m^2 m^2, with lengths in the renderer's unit
+
+        def bright(value: float, per_unit: float = 1.0) -> dict[str, Any]:
+            return _radiance_plugin(mi, gain * value * per_unit, getattr(light, "illuminant", DAYLIGHT))
+
+        match light:
+            case lights.UniformLight():
+                return {"type": "constant", "radiance": bright(light.luminance_cd_m2)}
+            case lights.PointLight():
+                position = frame.points(np.array(light.position_mm)).tolist()
+                return {
+                    "type": "point",
+                    "position": position,
+                    "intensity": bright(light.intensity_cd, per_cd),
+                }
+            case lights.SpotLight() if light.cutoff_deg < NARROW_DEG:
+                return _narrow_spot(mi, light, gain * per_cd, T(frame.rigid_pose(_lamp_pose(light))))
+            case lights.SpotLight():
+                angles = {"beam_width": light.beam_deg, "cutoff_angle": light.cutoff_deg}
+                to_world, intensity = (
+                    T(frame.rigid_pose(_lamp_pose(light))),
+                    bright(light.intensity_cd, per_cd),
+                )
+                return {"type": "spot", "to_world": to_world, "intensity": intensity} | angles
+            case lights.DirectionalLight():
+                direction, irradiance = (
+                    frame.directions(np.array(light.direction)),
+                    bright(light.illuminance_lux),
+                )
+                return {"type": "directional", "direction": direction.tolist(), "irradiance": irradiance}
+            case lights.EnvironmentLight():
+                bitmap = linear_bitmap(mi, np.ascontiguousarray(self.surroundings, dtype=np.float32))
+                # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z
+                # brings what is above to -Y and what is right to +X.
+                turned = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
+                to_world, scale = WorldFrame(frame.rotation).pose(mi, turned), gain * light.luminance_cd_m2
+                return {"type": "envmap", "bitmap": bitmap, "scale": scale, "to_world": to_world}
+            case lights.AreaLight():
+                black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+                emitter = {"type": "area", "radiance": bright(light.luminance_cd_m2)}
+                to_world = frame.pose(mi, T(_area_light_pose(light)))
+                return {"type": "rectangle", "to_world": to_world, "emitter": emitter, "bsdf": black}
+
+    def main_spectrum(self) -> np.ndarray:
+        """Mean spectrum (N,) of all that shines, each at luminance 1; daylight if only Mitsuba files do."""
+        emissions = filter(None, (thing.material.emission for thing in self.scene.objects))
+        colours = [getattr(lamp, "illuminant", DAYLIGHT) for lamp in (*self.scene.lights, *emissions)]
+        return np.mean([light_spectrum(self.mi, colour) for colour in colours or [DAYLIGHT]], axis=0)
+
+    def _level_gain(self, referenced_lux: float) -> float:
+        """By how much to make all that shines brighter for the scene's level; 1 without a level."""
+        level = self.scene.level
+        if level is None:
+            return 1.0
+        lux = sum(_illuminance_lux(light, level.z_mm, self.surroundings) for light in self.scene.lights)
+        lux += sum(self._object_lux(thing, level.z_mm) for thing in self.scene.objects) + referenced_lux
+        if not lux > 0:
+            raise InputError(
+                f"level: nothing shines on a surface at z_mm = {level.z_mm:g} that faces the cameras"
+            )
+        return level.illuminance_lux / lux
+
+    def _object_lux(self, thing: SceneObject, z_mm: float) -> float:
+        """Illuminance, in lux, that an object gives a surface as in `_illuminance_lux`."""
+        emission = thing.material.emission
+        if emission is None:
+            return 0.0
+        points = surface_points(solid_parts(thing.shape, thing.material, self.assets), POINTS)
+        matrix = np.array(pose_of(self.mi, thing).matrix, dtype=np.float64)[:3]
+        towards = points.position @ matrix[:, :3].T + matrix[:, 3] - [0.0, 0.0, z_mm]
+        shares = _shares(points.area, towards, points.normal @ matrix[:, :3].T)
+        if emission.texture is not None:
+            assert points.texcoord is not None
+            pixels = self.assets.image(emission.texture)
+            size = np.array(pixels.shape[1::-1])
+            col, row = np.clip((points.texcoord * [1, -1] + [0, 1]) * size, 0, size - 1).astype(np.int64).T
+            shares *= pixels[row, col] @ LUMINANCE
+        return float(emission.luminance_cd_m2 * shares.sum())
+
+
+def _radiance_plugin(mi: Any, luminance_cd_m2: float, colour: Illuminant) -> dict[str, Any]:
+    """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
     if is_spectral(mi):
-        raise InputError(f"{where}: images shine only in linear sRGB; leave it or sensor.camera out")
-    check_texcoords(where, shape, assets)
-    if not (isinstance(shape, Card | Sphere) or bears_pictures_once(triangles_of(shape, assets.meshes))):
-        raise InputError(
-            f"{where}: the shape bears parts of the picture several times or reaches beyond it; use each "
-            "texture coordinate from 0 to 1 once"
-        )
-    pixels = assets.image(emission.texture) * np.float32(luminance)
-    return {"type": "area", "radiance": texture_plugin(mi, pixels, shape, raw=True)}
+        return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
+    if isinstance(colour, str):
+        rgb = spectra.tint(colour)
+    else:
+        rgb = srgb_to_linear(np.array(colour))
+        rgb /= LUMINANCE @ rgb
+    return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
 
 
-def light_plugin(
-    mi: Any, light: lights.Light, gain: float, surroundings: np.ndarray | None, frame: WorldFrame
-) -> dict[str, Any]:
-    """The Mitsuba emitter of a light, `gain` times as bright; `surroundings` (H, W, 3) are of its image."""
-    T = mi.ScalarTransform4f
-    per_cd = 1e6 * frame.unit**2  # cd = cd/m^2 m^2, with lengths in the renderer's unit
+def light_spectrum(mi: Any, colour: Illuminant) -> np.ndarray:
+    """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
 
-    def bright(value: float, per_unit: float = 1.0) -> dict[str, Any]:
-        return radiance_plugin(mi, gain * value * per_unit, getattr(light, "illuminant", DAYLIGHT))
-
-    match light:
-        case lights.UniformLight():
-            return {"type": "constant", "radiance": bright(light.luminance_cd_m2)}
-        case lights.PointLight():
-            position = frame.points(np.array(light.position_mm)).tolist()
-            return {"type": "point", "position": position, "intensity": bright(light.intensity_cd, per_cd)}
-        case lights.SpotLight() if light.cutoff_deg < NARROW_DEG:
-            return _narrow_spot(mi, light, gain * per_cd, T(frame.rigid_pose(_lamp_pose(light))))
-        case lights.SpotLight():
-            angles = {"beam_width": light.beam_deg, "cutoff_angle": light.cutoff_deg}
-            to_world, intensity = T(frame.rigid_pose(_lamp_pose(light))), bright(light.intensity_cd, per_cd)
-            return {"type": "spot", "to_world": to_world, "intensity": intensity} | angles
-        case lights.DirectionalLight():
-            direction, irradiance = frame.directions(np.array(light.direction)), bright(light.illuminance_lux)
-            return {"type": "directional", "direction": direction.tolist(), "irradiance": irradiance}
-        case lights.EnvironmentLight():
-            bitmap = linear_bitmap(mi, np.ascontiguousarray(surroundings, dtype=np.float32))
-            # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z
-            # brings what is above to -Y and what is right to +X.
-            turned = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
-            to_world, scale = WorldFrame(frame.rotation).pose(mi, turned), gain * light.luminance_cd_m2
-            return {"type": "envmap", "bitmap": bitmap, "scale": scale, "to_world": to_world}
-        case lights.AreaLight():
-            black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
-            emitter = {"type": "area", "radiance": bright(light.luminance_cd_m2)}
-            to_world = frame.pose(mi, T(area_light_pose(light)))
-            return {"type": "rectangle", "to_world": to_world, "emitter": emitter, "bsdf": black}
+    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019).
+    """
+    if isinstance(colour, str):
+        return spectra.illuminant(colour)
+    rgb = srgb_to_linear(np.array(colour))
+    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), spectra.WAVELENGTH_NM)
+    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * spectra.illuminant(spectra.DAYLIGHT)
+    luminosity = spectra.observer()[1]
+    luminance = spectra.integral(luminosity * spectra.illuminant(spectra.DAYLIGHT))
+    return filtered * (luminance / spectra.integral(luminosity * filtered))
 
 
 def _narrow_spot(mi: Any, light: lights.SpotLight, gain: float, to_world: Any) -> dict[str, Any]:
@@ -164,13 +259,13 @@ def _narrow_spot(mi: Any, light: lights.SpotLight, gain: float, to_world: Any) -
     # A projector of irradiance E has the intensity pi E / cos^3.
     share *= (1 + slope**2) ** -1.5 / np.pi
     share = share.reshape(BEAM_PX, BEAM_PARTS, BEAM_PX, BEAM_PARTS).mean(axis=(1, 3))
-    rgb = np.array(radiance_plugin(mi, gain * light.intensity_cd, light.illuminant)["value"])
+    rgb = np.array(_radiance_plugin(mi, gain * light.intensity_cd, light.illuminant)["value"])
     bitmap = linear_bitmap(mi, np.ascontiguousarray(share[..., None] * rgb, dtype=np.float32))
     picture = {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}
     return {"type": "projector", "irradiance": picture, "fov": 2 * reach_deg, "to_world": to_world}
 
 
-def area_light_pose(light: lights.AreaLight) -> np.ndarray:
+def _area_light_pose(light: lights.AreaLight) -> np.ndarray:
     """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
     return _lamp_pose(light) * [light.width_mm / 2, light.height_mm / 2, 1, 1]
 
@@ -202,55 +297,13 @@ def sample_light(
     return np.array(sample.d, dtype=np.float64).T, np.array(weight).T
 
 
-def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
-    """The mean spectrum (N,) of all that shines, each at luminance 1; daylight if only Mitsuba files do."""
-    emissions = [thing.material.emission for thing in scene.objects if thing.material.emission is not None]
-    colours = [getattr(lamp, "illuminant", DAYLIGHT) for lamp in (*scene.lights, *emissions)]
-    return np.mean([light_spectrum(mi, colour) for colour in colours or [DAYLIGHT]], axis=0)
-
-
-def level_gain(
-    mi: Any, scene: Scene, assets: Assets, surroundings: np.ndarray | None, referenced_lux: float
-) -> float:
-    """By how much to make all that shines brighter for a plane to get the scene's level; 1 without a level.
-
-    `referenced_lux` is what a Mitsuba file's lights send there. Raises `InputError` if it gets no light.
-    """
-    if scene.level is None:
-        return 1.0
-    z_mm = scene.level.z_mm
-    lux = sum(illuminance_lux(light, z_mm, surroundings) for light in scene.lights)
-    lux += sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects) + referenced_lux
-    if not lux > 0:
-        raise InputError(f"level: nothing shines on a surface at z_mm = {z_mm:g} that faces the cameras")
-    return scene.level.illuminance_lux / lux
-
-
-def object_lux(mi: Any, thing: SceneObject, z_mm: float, assets: Assets) -> float:
-    """Illuminance, in lux, that an object gives a surface as in `illuminance_lux`; it never hides itself."""
-    emission = thing.material.emission
-    if emission is None:
-        return 0.0
-    points = surface_points(solid_parts(thing.shape, thing.material, assets), POINTS)
-    matrix = np.array(pose_of(mi, thing).matrix, dtype=np.float64)[:3]
-    towards = points.position @ matrix[:, :3].T + matrix[:, 3] - [0.0, 0.0, z_mm]
-    shares = _shares(points.area, towards, points.normal @ matrix[:, :3].T)
-    if emission.texture is not None:
-        assert points.texcoord is not None
-        pixels = assets.image(emission.texture)
-        size = np.array(pixels.shape[1::-1])
-        col, row = np.clip((points.texcoord * [1, -1] + [0, 1]) * size, 0, size - 1).astype(np.int64).T
-        shares *= pixels[row, col] @ LUMINANCE
-    return float(emission.luminance_cd_m2 * shares.sum())
-
-
 def _shares(area: np.ndarray, towards: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Area times cos a cos b / d^2 (N,) of parts of a lamp, for a surface that faces the cameras."""
     at_lamp = np.maximum(-(normal * towards).sum(axis=1), 0)
     return area * np.maximum(-towards[:, 2], 0) * at_lamp / (towards**2).sum(axis=1) ** 2
 
 
-def illuminance_lux(light: lights.Light, z_mm: float, surroundings: np.ndarray | None) -> float:
+def _illuminance_lux(light: lights.Light, z_mm: float, surroundings: np.ndarray | None) -> float:
     """Illuminance, in lux, of a surface at (0, 0, z) that faces the cameras, with nothing in a light's way.
 
     That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at it.
@@ -273,7 +326,7 @@ def illuminance_lux(light: lights.Light, z_mm: float, surroundings: np.ndarray |
             assert surroundings is not None
             return light.luminance_cd_m2 * _lux_from_around(light, surroundings)
         case lights.AreaLight():
-            pose, (node, weight) = area_light_pose(light), np.polynomial.legendre.leggauss(NODES)
+            pose, (node, weight) = _area_light_pose(light), np.polynomial.legendre.leggauss(NODES)
             x, y = np.meshgrid(node, node)
             towards = np.column_stack([x.ravel(), y.ravel()]) @ pose[:3, :2].T + pose[:3, 3] - point
             area = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)

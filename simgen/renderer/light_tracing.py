@@ -15,8 +15,7 @@ import numpy as np
 from pcii.base import LUMINANCE
 from simgen.cameras import Rig
 from simgen.renderer.backend import is_scalar, load_drjit, vectors
-from simgen.renderer.intersection import objects_by_shape
-from simgen.renderer.mitsuba_scene import RenderScene, shape_number
+from simgen.renderer.mitsuba_scene import RenderScene
 
 BEGIN_SHARE = 2e-4
 """Light begins this share of a lamp's distance from the cameras away from its surface. Larger: what touches a
@@ -29,10 +28,9 @@ class Arrivals(NamedTuple):
     """Light (A,) that passes the disc around the cameras and falls on the film of one that stands there.
 
     `lamp` is its number among the tracer's, `object_id` the last mirror or clear thing that it met before
-    anything else, 0 if that is no object.
-    `light` is what it adds to the sum of radiance over a film's pixels, `radiance` that of the lamp where it
-    left it, both in a random colour of the sensor; `peak` is the largest part of that as the renderer has it.
-    `bounces` are those on perfect mirrors and through clear
+    anything else, 0 if that is no object. `light` is what it adds to the sum of radiance over a film's
+    pixels, `radiance` that of the lamp where it left it, both in a random colour of the sensor; `peak` is the
+    largest part of that as the renderer has it. `bounces` are those on perfect mirrors and through clear
     surfaces that came first, and `is_scattered` says whether something rough came after them. It passes the
     disc at `place_mm` (A, 2) from `slope` (A, 2), in mm to the right and down per mm ahead.
     """
@@ -59,11 +57,6 @@ class LitPlaces(NamedTuple):
     point_mm: np.ndarray
     normal: np.ndarray
     area_mm2: np.ndarray
-
-
-def _no_arrivals() -> Arrivals:
-    whole, real, pairs = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 2))
-    return Arrivals(whole, whole, real, real, real, whole, np.zeros(0, dtype=bool), pairs, pairs)
 
 
 class _Rays(NamedTuple):
@@ -111,7 +104,7 @@ class LampTracer:
     @cached_property
     def objects(self) -> list[int]:
         """The object that each lamp belongs to: 0 if it is a lamp of the scene, -1 for the surroundings."""
-        ids = objects_by_shape(self.render_scene)
+        ids = self.render_scene.objects_by_shape()
         return [-1 if lamp.is_environment() else int(ids[lamp.get_shape().id()]) for lamp in self.lamps]
 
     def radiance_of(self, lamp: np.ndarray, seed: int) -> np.ndarray:
@@ -129,12 +122,13 @@ class LampTracer:
         rng = np.random.default_rng(seed)
         rays, weight, radiance, peak = self._leave(lamp, rng)
         particle = np.flatnonzero(radiance >= least_radiance)
-        rays, number, arrivals = rays.take(particle), lamp.size, [_no_arrivals()]
+        whole, real, pairs = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 2))
+        arrivals = [Arrivals(whole, whole, real, real, real, whole, real > 0, pairs, pairs)]
+        rays, number = rays.take(particle), lamp.size
         bounces, met = np.zeros((2, number), dtype=np.int64)
         is_scattered = np.zeros(number, dtype=bool)
-        brightest = (
-            self._light_per_power * (rays.power * weight[particle]).sum(axis=1).max(initial=0) / number
-        )
+        power = (rays.power * weight[particle]).sum(axis=1)
+        brightest = self._light_per_power * power.max(initial=0) / number
         for _ in range(self.render_scene.max_depth):
             if not particle.size:
                 break
@@ -151,11 +145,6 @@ class LampTracer:
             goes_on = onwards.power.any(axis=1) & (bounces[particle] > 0)
             rays, particle = onwards.take(goes_on), particle[goes_on]
         return Arrivals(*map(np.concatenate, zip(*arrivals, strict=True))), float(brightest)
-
-    @cached_property
-    def _middle(self) -> list[float]:
-        """Where the cameras' world begins, in the renderer's axes and unit."""
-        return self.render_scene.frame.points(np.zeros(3)).tolist()
 
     @cached_property
     def _light_per_power(self) -> float:
@@ -247,7 +236,8 @@ class LampTracer:
         away = mi.warp.square_to_cosine_hemisphere(mi.Point2f(numbers[2], numbers[3]))
         ray = start.spawn_ray(start.to_world(away))
         # A ray that begins nearer to a small ball would hit it, for rounding.
-        ahead = BEGIN_SHARE * load_drjit().norm(ray.o - mi.Point3f(*self._middle))
+        cameras = mi.Point3f(*self.render_scene.frame.points(np.zeros(3)).tolist())
+        ahead = BEGIN_SHARE * load_drjit().norm(ray.o - cameras)
         return ray.o + ahead * ray.d, ray.d, radiance * (area * np.pi), radiance
 
     def _leave_around(self, lamp: Any, numbers: Any, wavelengths: Any) -> tuple[Any, ...]:
@@ -266,7 +256,7 @@ class LampTracer:
         or clear; and how it goes on from there, by random `numbers` (N, 3)."""
         mi, scene = self.render_scene.mi, self.render_scene.scene
         context = mi.BSDFContext(mi.TransportMode.Importance)
-        ids = objects_by_shape(self.render_scene) if is_scalar(mi) else {}
+        ids = self.render_scene.objects_by_shape() if is_scalar(mi) else {}
 
         def end(columns: Any, wavelengths: Any) -> tuple[Any, ...]:
             ray = mi.RayDifferential3f(
@@ -280,7 +270,7 @@ class LampTracer:
             sample, weight = hit.bsdf(ray).sample(context, hit, columns[6], pair, is_hit)
             onwards = hit.spawn_ray(hit.to_world(sample.wo))
             is_perfect = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-            shape = ids[(hit.instance or hit.shape).id()] if ids else shape_number(self.render_scene, hit)
+            shape = ids[(hit.instance or hit.shape).id()] if ids else self.render_scene.shape_number(hit)
             return hit.t, shape, is_perfect, weight, onwards.o, onwards.d
 
         columns = np.concatenate([rays.origin, rays.direction, numbers], axis=1)

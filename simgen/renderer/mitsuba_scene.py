@@ -1,6 +1,10 @@
-"""From a validated scene to Mitsuba's: only this package names plugins, never a scene file."""
+"""From a validated scene to Mitsuba's, and what rays hit in it.
 
-from collections.abc import Hashable, Mapping
+Only this package names plugins, never a scene file. Rays come by the million, NumPy in and NumPy out: all at
+once in compiled modes, one by one in scalar mode.
+"""
+
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,17 +14,26 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types import CameraGrid
 from simgen.assets import Assets, read_assets, triangles_of
-from simgen.renderer import emission
-from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
-from simgen.renderer.emission import ShiningSurface
+from simgen.renderer.backend import floats, is_scalar, load_drjit, shape_numbers, vectors
+from simgen.renderer.emission import SceneLights, ShiningSurface
+from simgen.renderer.mitsuba_objects import (
+    WorldFrame,
+    backdrop_plugin,
+    paint_patterns,
+    shape_plugin,
+    surface_key,
+    surface_plugin,
+)
 from simgen.renderer.mitsuba_reference import Reference, reference_to
-from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, shape_plugin
-from simgen.renderer.mitsuba_surfaces import paint_patterns, reflectance_plugin, surface_key, surface_plugin
-from simgen.spec import MOST_OBJECTS, Backdrop, EnvironmentLight, Mesh, Scene, Sphere
+from simgen.spec import MOST_OBJECTS, Mesh, Scene, Sphere
 from simgen.spectral import Filters, filters_for
 
 BACKDROP, OBJECT, LIGHT = "simgen:backdrop", "simgen:object", "simgen:light"
 """Ids of shapes, which none of a Mitsuba file has; those of objects and lights end in their numbers."""
+SHY_OF_TARGET = 1e-4
+"""A ray to a target stops this share of its length before it."""
+PART = 1 << 14
+"""Rays that are Python numbers at once in scalar mode, where they take several times NumPy's memory."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,106 @@ class RenderScene:
     medium: Any = None
     hides_surroundings: bool = False
 
+    @property
+    def corners_mm(self) -> np.ndarray:
+        """Corners (N, 8, 3), in the world, of the boxes around Mitsuba's shapes."""
+        boxes = [shape.bbox() for shape in self.scene.shapes()]
+        corners = [[np.ravel(box.corner(number)) for number in range(8)] for box in boxes]
+        return self.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
+
+    def shape_number(self, hit: Any) -> Any:
+        """Mitsuba's number of the shapes that rays hit in compiled modes; of an instance its own."""
+        mi, dr = self.mi, load_drjit()
+        number = dr.reinterpret_array(mi.UInt32, hit.shape)
+        if not self.has_instances:
+            return number
+        instance = dr.reinterpret_array(mi.UInt32, hit.instance)
+        return dr.select(instance != 0, instance, number)
+
+    def not_finite(self, number: int, view: tuple[int, int], pixel: tuple[int, int], grid: CameraGrid) -> str:
+        """The sentence for light of an object (0: none) in a pixel of a view that is no finite number."""
+        name = self.names.get(number)
+        what = "what is seen beside the objects" if name is None else f"object '{name}'"
+        # The size tells views of the dataset from the coarse ones that are looked at before.
+        where = f"row {pixel[0]}, column {pixel[1]} of view {view}, of {grid.height} x {grid.width} px"
+        return (
+            f"{what}: its radiance in {where}, is not a finite number; make tiny lamps larger, or move them "
+            "away from it"
+        )
+
+    def first_objects(self, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Object id (N,) int16, 0 for none, of what rays from an origin (3,) in directions (N, 3) hit."""
+        return np.maximum(self._objects_hit(origin_mm, direction, np.inf), 0)
+
+    def first_points(
+        self, origin_mm: np.ndarray, direction: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What rays from one origin (3,) in directions (N, 3) hit first: points (N, 3) in mm, infinite for a
+        miss, normals (N, 3) of the surface, and object ids (N,) int16, 0 for none."""
+        rays = self._rays(origin_mm, direction, np.inf)
+        scene, frame = self.scene, self.frame
+        if is_scalar(self.mi):
+            hits = [scene.ray_intersect(self.mi.RayDifferential3f(ray)) for ray in rays]
+            points = np.array([np.ravel(hit.p) for hit in hits])
+            normals = np.array([np.ravel(hit.n) for hit in hits])
+            is_hit = np.array([hit.is_valid() for hit in hits], dtype=bool)
+        else:
+            hit = scene.ray_intersect(rays)
+            points, normals = np.array(hit.p).T, np.array(hit.n).T
+            is_hit = np.array(hit.is_valid(), dtype=bool)
+        points_mm = np.where(is_hit[:, None], frame.points_mm(points), np.inf)
+        return points_mm, frame.world_directions(normals), self.first_objects(origin_mm, direction)
+
+    def standing_before(
+        self, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
+    ) -> np.ndarray:
+        """Object id (N,) int16 of what stands between origins and targets (N, 3), 0 of no object, -1 for
+        nothing; rays stop `shy_of_target` of their length before the target."""
+        if not len(origin_mm):
+            return np.zeros(0, dtype=np.int16)
+        return self._objects_hit(origin_mm, target_mm - origin_mm, 1 - shy_of_target)
+
+    def blocked(self, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
+        """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
+        rays = self._rays(origin_mm, target_mm - origin_mm, 1 - SHY_OF_TARGET)
+        ray_test = self.scene.ray_test
+        if is_scalar(self.mi):
+            return np.fromiter(map(ray_test, rays), dtype=bool, count=len(origin_mm))
+        return np.array(ray_test(rays))
+
+    def _objects_hit(self, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> np.ndarray:
+        """Object id (N,) int16 of what rays hit first: 0 of no object, -1 for nothing."""
+        rays, scene = self._rays(origin_mm, away_mm, share), self.scene
+        if is_scalar(self.mi):
+            ids = self.objects_by_shape()
+            hits = (scene.ray_intersect(self.mi.RayDifferential3f(ray)) for ray in rays)
+            objects = [ids[(hit.instance or hit.shape).id()] if hit.is_valid() else -1 for hit in hits]
+            return np.array(objects, dtype=np.int16)
+        hit = scene.ray_intersect_preliminary(rays)
+        shape = np.array(load_drjit().select(hit.is_valid(), self.shape_number(hit), 0))
+        return np.where(shape > 0, self.object_of_shape[shape], np.int16(-1))
+
+    def _rays(self, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> Any:
+        """Rays from origins (N, 3), or from one (3,), along a share of vectors (N, 3) of the world.
+
+        In scalar mode they come one after the other.
+        """
+        mi, frame = self.mi, self.frame
+        length_mm = np.sqrt(sum(component**2 for component in away_mm.T))
+        origin, unit = frame.points(np.atleast_2d(origin_mm)), frame.directions(away_mm / length_mm[:, None])
+        length = length_mm * share * frame.unit
+        if is_scalar(mi):
+            rows = rows_of(np.column_stack([np.broadcast_to(origin, unit.shape), unit, length]))
+            return (mi.Ray3f(mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6])), row[6]) for row in rows)
+        ray = mi.Ray3f(vectors(mi, mi.Point3f, origin), vectors(mi, mi.Vector3f, unit))
+        ray.maxt = floats(mi, length)
+        return ray
+
+    def objects_by_shape(self) -> dict[str, int]:
+        """The object that each shape belongs to, by the shape's own id; for scalar mode."""
+        numbers = zip(self.scene.shapes(), shape_numbers(self.scene), strict=True)
+        return {shape.id(): self.object_of_shape[number] for shape, number in numbers}
+
 
 def build(
     mi: Any,
@@ -75,23 +188,22 @@ def build(
         if scene.level is not None:
             referenced_lux = reference.illuminance_lux(scene.level.z_mm)
     around = scene.light_around
-    surroundings = assets.environments[around.file] if isinstance(around, EnvironmentLight) else None
     hides_surroundings = around is not None and not around.visible
     if hides_surroundings and has_media:
         raise InputError(
             f"{folder}: lights: one that is not visible does not go with a medium; leave out visible"
         )
-    gain = emission.level_gain(mi, scene, assets, surroundings, referenced_lux)
-    plugins = _object_plugins(mi, scene, assets, gain, frame)
+    lights = SceneLights(mi, scene, assets, frame, referenced_lux)
+    plugins = _object_plugins(lights)
     if scene.backdrop is not None:
-        plugins[BACKDROP] = _backdrop_plugin(mi, scene.backdrop, frame)
+        plugins[BACKDROP] = backdrop_plugin(mi, scene.backdrop, frame)
     for number, light in enumerate(scene.lights, start=1):
-        plugins[f"{LIGHT}{number}"] = emission.light_plugin(mi, light, gain, surroundings, frame)
-    filters = None if curves is None else filters_for(curves, emission.main_spectrum(mi, scene))
-    shining, why_rendered = list(emission.shining_surfaces(mi, scene, assets, gain, filters)), ""
+        plugins[f"{LIGHT}{number}"] = lights.light_plugin(light)
+    filters = None if curves is None else filters_for(curves, lights.main_spectrum())
+    shining, why_rendered = list(lights.surfaces(filters)), ""
     integrator, medium = {"type": "volpath" if has_media else "path", "max_depth": max_depth}, None
     if reference is not None:
-        loaded, medium = reference.build(plugins, integrator, gain)
+        loaded, medium = reference.build(plugins, integrator, lights.gain)
         surfaces, why_rendered = reference.shining_surfaces(loaded, ids, filters)
         shining += surfaces
     else:
@@ -138,16 +250,9 @@ def _numbered_objects(
     return ids, names
 
 
-def _backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, Any]:
-    """A matt wall, seen from either side."""
-    matt = {"type": "diffuse", "reflectance": reflectance_plugin(mi, wall.reflectance)}
-    pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
-    to_world = pose @ card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
-    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
-
-
-def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:
+def _object_plugins(lights: SceneLights) -> dict[str, Any]:
     """Shapes of all objects by id; objects that look alike share a surface."""
+    mi, scene, assets = lights.mi, lights.scene, lights.assets
     plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
     patterns = paint_patterns(scene.objects)
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
@@ -156,9 +261,9 @@ def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: W
             if key not in surfaces:
                 surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
             parts = {"bsdf": surfaces[key]}
-            if (emitter := emission.emission_plugin(mi, thing, assets, gain)) is not None:
+            if (emitter := lights.object_plugin(thing)) is not None:
                 parts["emitter"] = mi.load_dict(emitter)
-            plugins[f"{OBJECT}{number}"] = shape_plugin(mi, thing, assets, parts, reach_mm, frame)
+            plugins[f"{OBJECT}{number}"] = shape_plugin(mi, thing, assets, parts, reach_mm, lights.frame)
         except InputError as fault:
             raise InputError(f"object '{thing.name}', {fault}") from None
     return plugins
@@ -194,25 +299,7 @@ def _numbers_as_data(mi: Any, loaded: Any) -> None:
     parameters.update()
 
 
-def shape_number(render_scene: RenderScene, hit: Any) -> Any:
-    """Mitsuba's number of the shapes that rays hit in compiled modes: of the instance, where it is one."""
-    mi, dr = render_scene.mi, load_drjit()
-    number = dr.reinterpret_array(mi.UInt32, hit.shape)
-    if not render_scene.has_instances:
-        return number
-    instance = dr.reinterpret_array(mi.UInt32, hit.instance)
-    return dr.select(instance != 0, instance, number)
-
-
-def not_finite(
-    render_scene: RenderScene, number: int, view: tuple[int, int], pixel: tuple[int, int], grid: CameraGrid
-) -> str:
-    """The sentence for light of an object (0: none) in a pixel of a view that is no finite number."""
-    name = render_scene.names.get(number)
-    what = "what is seen beside the objects" if name is None else f"object '{name}'"
-    # The size tells views of the dataset from the coarse ones that are looked at before.
-    where = f"row {pixel[0]}, column {pixel[1]} of view {view}, of {grid.height} x {grid.width} px"
-    return (
-        f"{what}: its radiance in {where}, is not a finite number; make tiny lamps larger, or move them away "
-        "from it"
-    )
+def rows_of(array: np.ndarray) -> Iterator[list[float]]:
+    """The rows of an array (N, C) as Python's numbers, never many at once; for scalar mode."""
+    for start in range(0, len(array), PART):
+        yield from array[start : start + PART].tolist()

@@ -8,17 +8,16 @@ each ray, and needs a compiled backend.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from simgen.cameras import Rig, film_slopes, slopes_behind_lens
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
-from simgen.renderer.mitsuba_scene import RenderScene, shape_number
-from simgen.renderer.wavelengths import Light
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.ray_states import Light
 
 STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
@@ -35,8 +34,7 @@ DIRECTIONS = 256
 """Evenly spread directions in which light from all around is looked at."""
 
 
-@dataclass(frozen=True)
-class FirstHits:
+class FirstHits(NamedTuple):
     """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
 
     `guess` is the radiance that is known without a light path: what the lamps would give if nothing stood
@@ -87,32 +85,6 @@ def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
     return sum(terms[1:], terms[0]) if terms else 0
 
 
-def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
-    """What each active ray hits first; `ambient` is the radiance that is guessed to come from all around."""
-    mi, dr = render_scene.mi, load_drjit()
-    record = render_scene.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
-    is_hit, missed = active & hit.is_valid(), active & ~hit.is_valid()
-    shape = dr.select(is_hit, shape_number(render_scene, hit), 0)
-    z_mm = dr.select(is_hit, render_scene.frame.z_mm(hit.p), dr.inf)
-    guess = surroundings_seen(render_scene, hit, missed)
-    bsdf, context = hit.bsdf(ray), mi.BSDFContext()
-    for lamp in _lamps(render_scene.scene):
-        towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), is_hit)
-        scattered = bsdf.eval(context, hit, hit.to_local(towards.d), is_hit)
-        guess += dr.select(is_hit & (towards.pdf > 0), scattered * weight, 0)
-    reflectance = bsdf.eval_diffuse_reflectance(hit, is_hit)
-    guess += dr.select(is_hit, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
-    return FirstHits(record, shape, z_mm, guess)
-
-
-def surroundings_seen(render_scene: RenderScene, hit: Any, missed: Any) -> Any:
-    """What a camera sees of what shines from all around, where its rays have missed everything."""
-    if render_scene.hides_surroundings:
-        return render_scene.mi.Spectrum(0)
-    return hit.emitter(render_scene.scene, missed).eval(hit, missed)
-
-
 def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
     mi, dr, around = render_scene.mi, load_drjit(), render_scene.scene.environment()
@@ -143,10 +115,6 @@ def bright_directions(render_scene: RenderScene, number: int, seed: int) -> np.n
     return render_scene.frame.world_directions(np.concatenate([np.zeros((0, 3)), *samples]))
 
 
-def _lamps(scene: Any) -> list[Any]:
-    return [light for light in scene.emitters() if not light.is_environment()]
-
-
 def _surroundings(mi: Any, scene: Any) -> list[Any]:
     """The image of what shines from all around, if there is one: a sun in it is to be aimed at.
 
@@ -157,107 +125,112 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
     return [around] if varies else []
 
 
-def mirrored_radiance(
-    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, above: Any
-) -> tuple[Any, Any]:
-    """Radiance that one path from each first hit finds of what is brighter than `above`, in any colour, and
-    seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request.
+class PathTracer:
+    """What camera rays meet in a scene: their first hits, and radiance along a path from each.
 
-    And the number of mirrors and clear surfaces before the last that it has found.
+    A path finds nothing of what is seen by perfect mirrors and clear surfaces alone and is brighter than its
+    `hidden_above`; inf hides nothing.
     """
-    mi, dr, scene, context = render_scene.mi, load_drjit(), render_scene.scene, render_scene.mi.BSDFContext()
 
-    def lengthen(
-        active: Any, left: Any, ray: Any, hit: Any, radiance: Any, weight: Any, last_bright: Any, sampler: Any
-    ) -> tuple[Any, ...]:
-        choice, pair = sampler.next_1d(active), sampler.next_2d(active)
-        sample, of_segment = hit.bsdf(ray).sample(context, hit, choice, pair, active)
-        active &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta) & dr.any(of_segment != 0)
-        ray = hit.spawn_ray(hit.to_world(sample.wo))
-        hit, weight = scene.ray_intersect(ray, active), weight * of_segment
-        shines = dr.select(active, hit.emitter(scene, active).eval(hit, active), 0)
-        is_bright = dr.max(shines) > above
-        radiance += dr.select(is_bright, weight * shines, 0)
-        last_bright = dr.select(is_bright, longest - left, last_bright)
-        return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, last_bright, sampler
+    def __init__(self, render_scene: RenderScene) -> None:
+        self.render_scene, self.mi, self.dr = render_scene, render_scene.mi, load_drjit()
+        self.scene, self.context = render_scene.scene, self.mi.BSDFContext()
+        self.lamps = [light for light in self.scene.emitters() if not light.is_environment()]
+        self.aimed_at = self.lamps + _surroundings(self.mi, self.scene)
 
-    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    longest = dr.opaque(mi.UInt32, render_scene.max_depth)
-    left = dr.opaque(mi.UInt32, render_scene.max_depth - 1)
-    path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), mi.UInt32(0), sampler
-    path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)
-    return path[4], path[6]
+    def hit_first(self, ray: Any, active: Any, ambient: Any) -> FirstHits:
+        """What each active ray hits first; `ambient` is the radiance guessed to come from all around."""
+        mi, dr = self.mi, self.dr
+        record = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
+        is_hit, missed = active & hit.is_valid(), active & ~hit.is_valid()
+        shape = dr.select(is_hit, self.render_scene.shape_number(hit), 0)
+        z_mm = dr.select(is_hit, self.render_scene.frame.z_mm(hit.p), dr.inf)
+        guess, bsdf = self._surroundings_seen(hit, missed), hit.bsdf(ray)
+        for lamp in self.lamps:
+            towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), is_hit)
+            scattered = bsdf.eval(self.context, hit, hit.to_local(towards.d), is_hit)
+            guess += dr.select(is_hit & (towards.pdf > 0), scattered * weight, 0)
+        reflectance = bsdf.eval_diffuse_reflectance(hit, is_hit)
+        guess += dr.select(is_hit, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
+        return FirstHits(record, shape, z_mm, guess)
 
+    def _surroundings_seen(self, hit: Any, missed: Any) -> Any:
+        """What a camera sees of what shines from all around, where its rays have missed everything."""
+        if self.render_scene.hides_surroundings:
+            return self.mi.Spectrum(0)
+        return hit.emitter(self.scene, missed).eval(hit, missed)
 
-def radiance_along(
-    render_scene: RenderScene, ray: Any, record: Any, sampler: Any, left_out: tuple[Any, Any] | None = None
-) -> Any:
-    """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
+    def mirrored_radiance(self, ray: Any, record: Any, sampler: Any, above: Any) -> tuple[Any, Any]:
+        """Radiance that one path from each first hit finds of what is brighter than `above`, in any colour,
+        and seen by perfect mirrors and clear surfaces alone: what `radiance_along` leaves out on request.
 
-    What the first hit shines itself is left out, but not what shines from all around where nothing is hit.
-    A path is split at the first hit, where `STRATA` x `STRATA` points
-    of each lamp and `BOUNCES` directions are followed, each as one path. Of `left_out`, whether for each ray
-    and the radiance above which, `mirrored_radiance` is left out too.
-    """
-    mi, dr, max_depth = render_scene.mi, load_drjit(), render_scene.max_depth
-    hides, above = left_out or (mi.Bool(False), mi.Float(0))
-    tracer = _Tracer(render_scene, above)
-    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    is_hit = hit.is_valid()
-    radiance = surroundings_seen(render_scene, hit, ~is_hit)
-    if max_depth == 1:
+        And the number of mirrors and clear surfaces before the last that it has found.
+        """
+        mi, dr, scene, max_depth = self.mi, self.dr, self.scene, self.render_scene.max_depth
+
+        def lengthen(*path: Any) -> tuple[Any, ...]:
+            active, left, ray, hit, radiance, weight, last_bright, sampler = path
+            choice, pair = sampler.next_1d(active), sampler.next_2d(active)
+            sample, of_segment = hit.bsdf(ray).sample(self.context, hit, choice, pair, active)
+            active &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta) & dr.any(of_segment != 0)
+            ray = hit.spawn_ray(hit.to_world(sample.wo))
+            hit, weight = scene.ray_intersect(ray, active), weight * of_segment
+            shines = dr.select(active, hit.emitter(scene, active).eval(hit, active), 0)
+            is_bright = dr.max(shines) > above
+            radiance += dr.select(is_bright, weight * shines, 0)
+            last_bright = dr.select(is_bright, longest - left, last_bright)
+            return active & hit.is_valid(), left - 1, ray, hit, radiance, weight, last_bright, sampler
+
+        hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
+        longest, left = (dr.opaque(mi.UInt32, depth) for depth in (max_depth, max_depth - 1))
+        path = hit.is_valid(), left, mi.Ray3f(ray), hit, mi.Spectrum(0), mi.Spectrum(1), mi.UInt32(0), sampler
+        path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), lengthen)
+        return path[4], path[6]
+
+    def radiance_along(
+        self, ray: Any, record: Any, sampler: Any, left_out: tuple[Any, Any] | None = None
+    ) -> Any:
+        """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
+
+        What the first hit shines itself is left out, but not what shines from all around where nothing is
+        hit. A path is split at the first hit, where `STRATA` x `STRATA` points of each lamp and `BOUNCES`
+        directions are followed, each as one path. Of `left_out`, whether for each ray and the radiance above
+        which, `mirrored_radiance` is left out too.
+        """
+        mi, dr, max_depth = self.mi, self.dr, self.render_scene.max_depth
+        hidden_above = mi.Float(dr.inf) if left_out is None else dr.select(*left_out, dr.inf)
+        hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
+        is_hit = hit.is_valid()
+        radiance = self._surroundings_seen(hit, ~is_hit)
+        if max_depth == 1:
+            return radiance
+        bsdf = hit.bsdf(ray)
+        radiance += self._direct_light(hit, bsdf, sampler, is_hit, STRATA, BOUNCES)
+        left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
+        for bounce in range(BOUNCES):
+            segment = self._next_segment(hit, bsdf, sampler, is_hit, hidden_above, bounce)
+            ray, end, active, emitted, weight, still_hidden = segment
+            path = active, left, ray, end, emitted, mi.Spectrum(1), still_hidden, sampler
+            if max_depth > 2:
+                # A loop also for short paths: it is as fast as unrolled segments.
+                path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), self._lengthen)
+            *_, light, _, _, sampler = path
+            radiance += weight * light / BOUNCES
         return radiance
-    bsdf = hit.bsdf(ray)
-    radiance += tracer.direct_light(hit, bsdf, sampler, STRATA, BOUNCES, is_hit)
-    left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
-    for bounce in range(BOUNCES):
-        ray, end, active, emitted, weight, still_hides = tracer.next_segment(
-            hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit, hides
-        )
-        path = active, left, ray, end, emitted, mi.Spectrum(1), still_hides, sampler
-        if max_depth > 2:
-            # A loop also for short paths: it is as fast as unrolled segments.
-            path = dr.while_loop(path, lambda active, left, *_: active & (left > 0), tracer.lengthen)
-        *_, light, _, _, sampler = path
-        radiance += weight * light / BOUNCES
-    return radiance
 
-
-class _Tracer:
-    """The parts of a path: light that comes straight from lamps, and the segment that goes on.
-
-    A path that hides what it meets by mirrors alone finds nothing there that is brighter than `above`.
-    """
-
-    def __init__(self, render_scene: RenderScene, above: Any) -> None:
-        self.above = above
-        self.mi, self.dr, self.scene = render_scene.mi, load_drjit(), render_scene.scene
-        self.context = self.mi.BSDFContext()
-        around = _surroundings(self.mi, self.scene)
-        self.lamps, self.aims_around = _lamps(self.scene) + around, bool(around)
-
-    def lengthen(
-        self,
-        active: Any,
-        left: Any,
-        ray: Any,
-        hit: Any,
-        radiance: Any,
-        throughput: Any,
-        hides: Any,
-        sampler: Any,
-    ) -> tuple[Any, ...]:
+    def _lengthen(self, *path: Any) -> tuple[Any, ...]:
         """Paths with one more segment, unless Russian roulette (Arvo and Kirk 1990) ends them.
 
         `ray` and `hit` are of the last segment, `radiance` is what all segments from the second hit on have
         brought so far, and `throughput` what share of the light that leaves `hit` arrives at the path's
         beginning. Paths that are active have `left` more segments at most.
         """
+        active, left, ray, hit, radiance, throughput, hidden_above, sampler = path
         dr, bsdf = self.dr, hit.bsdf(ray)
-        direct = throughput * self.direct_light(hit, bsdf, sampler, 1, 1, active)
-        ray, hit, active, emitted, weight, hides = self.next_segment(
-            hit, bsdf, sampler, 1, 1, 0, active, hides
-        )
+        direct = throughput * self._direct_light(hit, bsdf, sampler, active)
+        segment = self._next_segment(hit, bsdf, sampler, active, hidden_above)
+        ray, hit, active, emitted, weight, hidden_above = segment
         throughput = throughput * weight
         radiance = radiance + direct + throughput * emitted
         left = left - 1
@@ -267,13 +240,15 @@ class _Tracer:
         # Only faint paths draw a number, so that the others are those without roulette.
         active &= ~is_faint | (sampler.next_1d(is_faint) * ROULETTE_THROUGHPUT < largest)
         throughput = dr.select(is_faint, throughput * (ROULETTE_THROUGHPUT / largest), throughput)
-        return active, left, ray, hit, radiance, throughput, hides, sampler
+        return active, left, ray, hit, radiance, throughput, hidden_above, sampler
 
-    def direct_light(self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, active: Any) -> Any:
+    def _direct_light(
+        self, hit: Any, bsdf: Any, sampler: Any, active: Any, side: int = 1, bounces: int = 1
+    ) -> Any:
         """Light straight from all lamps, from `side` x `side` points of each, that leaves `hit` backwards."""
         mi, dr, radiance = self.mi, self.dr, self.mi.Spectrum(0)
         scatters = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        for lamp, cell in product(self.lamps, np.ndindex(side, side)):
+        for lamp, cell in product(self.aimed_at, np.ndindex(side, side)):
             point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / side
             towards, weight = lamp.sample_direction(hit, point, scatters)
             able = scatters & (towards.pdf != 0)
@@ -283,18 +258,18 @@ class _Tracer:
             radiance += dr.select(able & ~blocked, value * weight * mis_weight, 0) / side**2
         return radiance
 
-    def next_segment(
-        self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, bounce: int, active: Any, hides: Any
-    ) -> tuple[Any, Any, Any, Any, Any, Any]:
-        """The segment that leaves `hit` as number `bounce` of `bounces`, in a direction that `bsdf` chose.
+    def _next_segment(
+        self, hit: Any, bsdf: Any, sampler: Any, active: Any, hidden_above: Any, bounce: int | None = None
+    ) -> tuple[Any, ...]:
+        """The segment that leaves `hit`, the first one as number `bounce`, in a direction that `bsdf` chose.
 
-        Its ray, its end, whether a path goes on from there, what shines there, weighted against aiming at it
-        (at `side` x `side` points of each lamp), the share of the light along the ray that leaves `hit`, and
-        whether the path hides what it meets next by mirrors alone.
+        Its ray, its end, whether a path goes on from there, what shines there, weighted against aiming at it,
+        the share of the light along the ray that leaves `hit`, and `hidden_above` from there on.
         """
+        side, bounces = (1, 1) if bounce is None else (STRATA, BOUNCES)
         mi, dr, place = self.mi, self.dr, self.mi.Interaction3f(hit)
         across = sampler.next_2d(active)
-        across.x = (across.x + bounce) / bounces
+        across.x = (across.x + (bounce or 0)) / bounces
         sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
         active = active & dr.any(weight != 0)
         ray = hit.spawn_ray(hit.to_world(sample.wo))
@@ -303,14 +278,15 @@ class _Tracer:
         towards = mi.DirectionSample3f(self.scene, arrival, place)
         # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
         is_mirrored = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        could_be_aimed_at, hides = ~is_mirrored, hides & is_mirrored
-        if not self.aims_around:
+        could_be_aimed_at, hidden_above = ~is_mirrored, dr.select(is_mirrored, hidden_above, dr.inf)
+        if self.aimed_at == self.lamps:
             could_be_aimed_at &= arrival.is_valid()
         pdf_lamp = side**2 * lamp.pdf_direction(place, towards, active)
         mis_weight = dr.select(could_be_aimed_at, _power_heuristic(bounces * sample.pdf, pdf_lamp), 1)
         shines = lamp.eval(arrival, active)
-        emitted = dr.select(active & ~(hides & (dr.max(shines) > self.above)), shines * mis_weight, 0)
-        return ray, arrival, active & arrival.is_valid(), emitted, dr.select(active, weight, 0), hides
+        emitted = dr.select(active & ~(dr.max(shines) > hidden_above), shines * mis_weight, 0)
+        goes_on, weight = active & arrival.is_valid(), dr.select(active, weight, 0)
+        return ray, arrival, goes_on, emitted, weight, hidden_above
 
 
 def _power_heuristic(pdf: Any, other: Any) -> Any:

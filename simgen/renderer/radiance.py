@@ -8,10 +8,8 @@ import numpy as np
 from pcii.base import InputError
 from simgen.cameras import Camera, Cameras, as_rig
 from simgen.renderer.backend import load_drjit, shape_numbers
-from simgen.renderer.intersection import first_objects
-from simgen.renderer.mitsuba_scene import RenderScene, not_finite
-from simgen.renderer.mitsuba_shapes import WorldFrame
-from simgen.renderer.mitsuba_surfaces import spectrum_plugin
+from simgen.renderer.mitsuba_objects import WorldFrame, spectrum_plugin
+from simgen.renderer.mitsuba_scene import RenderScene
 
 LEAST_STEP_PX = 8
 """Sides of windows are multiples of this at least: smaller steps would save no time that can be measured."""
@@ -86,8 +84,8 @@ def render_view(
     wrong = np.argwhere(~np.isfinite(image).all(axis=2))
     if wrong.size:
         row, col = wrong[0].tolist()
-        number = int(first_objects(render_scene, camera.position_mm, camera.towards(*wrong[:1].T))[0])
-        raise InputError(not_finite(render_scene, number, (k, l), (row, col), camera.grid))
+        number = int(render_scene.first_objects(camera.position_mm, camera.towards(*wrong[:1].T))[0])
+        raise InputError(render_scene.not_finite(number, (k, l), (row, col), camera.grid))
     return image
 
 
@@ -142,17 +140,14 @@ def windows_of_objects(
     render_scene: RenderScene, camera: Camera, samples_per_pixel: int, background_samples: int
 ) -> tuple[list[Window], int]:
     """Where objects can be seen, and how many light paths fewer samples elsewhere save."""
-    scene = render_scene.scene
-    is_object = render_scene.object_of_shape[shape_numbers(scene)] > 0
-    boxes = [shape.bbox() for shape, is_one in zip(scene.shapes(), is_object, strict=True) if is_one]
-    corners = [[box.corner(number) for number in range(8)] for box in boxes]
-    corners_mm = render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
-    windows, pixels = object_windows(camera, corners_mm), camera.grid.height * camera.grid.width
+    is_object = render_scene.object_of_shape[shape_numbers(render_scene.scene)] > 0
+    windows = _object_windows(camera, render_scene.corners_mm[is_object])
+    pixels = camera.grid.height * camera.grid.width
     covered = sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
     return windows, (samples_per_pixel - background_samples) * pixels - samples_per_pixel * covered
 
 
-def object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
+def _object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
     """Windows that do not overlap, outside of which the camera sees none of the boxes with corners (N, 8, 3).
 
     The whole film is the only one if a box reaches behind the camera, or if the camera has a lens.

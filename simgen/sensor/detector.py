@@ -135,10 +135,8 @@ def nested_subset(
             first, larger = rng.binomial(first, smaller / larger), smaller
             if smaller == budget:
                 break
-    belongs = np.ones(counts.k.size, dtype=bool)
-    has_rank = counts.rank >= 0
-    belongs[has_rank] = counts.rank[has_rank] < first[counts.scope[has_rank]]
-    return belongs
+    # Counts without a photon have the scope and the rank -1.
+    return (counts.rank < 0) | (counts.rank < np.append(first, 0)[counts.scope])
 
 
 def detect(
@@ -161,46 +159,40 @@ def detect(
     views, pixels = grid.view_count, grid.height * grid.width
     if sensor.dark_counts > 0:
         number = rng.poisson(sensor.dark_counts * views * pixels)
-        dark = rng.integers(0, views * pixels, number)
-        parts.append(_without_photon(grid, dark, np.ones(number, np.int64)))
+        parts.append(_without_photon(grid, rng.integers(0, views * pixels, number)))
     if dark_map is not None:
         # Counts of all views at once, each of which then falls into a view evenly.
         each = views if dark_map.ndim == 2 else 1
         n = rng.poisson(each * dark_map.ravel())
         dark = np.arange(n.size).repeat(n)
         dark += pixels * rng.integers(each, size=dark.size)
-        parts.append(_without_photon(grid, dark, np.ones(dark.size, np.int64)))
-    hot, dead = _faulty_pixels(sensor, pixels, seed)
-    if hot.size:
-        n = rng.poisson(sensor.hot_pixel_counts, (views, hot.size))
-        parts.append(_without_photon(grid, (np.arange(views)[:, None] * pixels + hot).ravel(), n.ravel()))
+        parts.append(_without_photon(grid, dark))
+    hot, dead = (round(share * pixels) for share in (sensor.hot_pixel_share, sensor.dead_pixel_share))
+    # One camera takes all views, so the same pixels are faulty in each.
+    order = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
+    if hot:
+        n = rng.poisson(sensor.hot_pixel_counts, (views, hot))
+        flat = (np.arange(views)[:, None] * pixels + order[:hot]).ravel()
+        parts.append(_without_photon(grid, flat, n.ravel()))
     counts = joined(parts)
-    if dead.size:
+    if dead:
         works = np.ones(pixels, dtype=bool)
-        works[dead] = False
+        works[order[pixels - dead :]] = False
         counts = counts.take(works.reshape(grid.shape_HW)[counts.i, counts.j])
     return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
-def _faulty_pixels(sensor: Sensor, pixels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Hot and dead pixels of the one camera that takes all views: the same ones in each."""
-    hot, dead = (round(share * pixels) for share in (sensor.hot_pixel_share, sensor.dead_pixel_share))
-    if not hot + dead:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    order = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
-    return order[:hot], order[pixels - dead :]
-
-
-def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:
-    """Counts at flat (view, row, column) indices that no photon made."""
+def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray | None = None) -> PhotonTable:
+    """Counts at flat (view, row, column) indices that no photon made, each single without `n`."""
     k, l, i, j = np.unravel_index(flat, grid.shape_KLHW)
+    n = np.ones(flat.size, np.int64) if n is None else n
     nowhere, no_object = np.full(flat.size, -1), np.full(flat.size, NO_OBJECT)
     return PhotonTable(k, l, i, j, n, nowhere, nowhere, no_object, np.full(flat.size, np.inf))
 
 
 def in_frames(counts: PhotonTable, sensor: Sensor, seed: int) -> PhotonTable:
-    """Counts one by one, each in a frame: as many rows as counts. Of one frame they stay as they are."""
-    if sensor.frames == 1:
+    """Counts one by one, each in a frame; as they are if there is one frame, or if theirs are known."""
+    if sensor.frames == 1 or counts.frame is not None:
         return counts
     counts = counts.one_by_one()
     rng = seeds.generator(seed, stage="frames")
@@ -220,8 +212,7 @@ def read_out(
     if (sensor.bits is None and not keeps_frames) or not counts.k.size:
         return counts.by_pixel(grid)
     if counts.object_id is not None or counts.frame is not None:
-        single = counts if counts.frame is not None else in_frames(counts, sensor, seed)
-        return _first_counts(single.one_by_one(), grid, sensor, seed)
+        return _first_counts(in_frames(counts, sensor, seed).one_by_one(), grid, sensor, seed)
     return joined([*_summed(counts, grid, sensor, seed, keeps_frames)])
 
 
@@ -244,8 +235,7 @@ def _first_counts(counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: i
     if sensor.readout.most_per_frame is None:
         return counts.take(order)
     cell = cell[order]
-    first = np.flatnonzero(np.diff(cell, prepend=-1))
-    place = np.arange(cell.size) - first.repeat(np.diff(first, append=cell.size))
+    place = np.arange(cell.size) - np.searchsorted(cell, cell)
     return counts.take(order[place < sensor.readout.most_per_frame])
 
 

@@ -5,15 +5,13 @@ Planar depth, object ids and normals are those of the ray through the pixel's ce
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
-from typing import Any
 
 import numpy as np
 
 from pcii.base import Report, silent
 from pcii.types import CameraGrid
 from simgen.cameras import Camera, Cameras, Rig, as_rig, centre_camera
-from simgen.renderer import RenderScene, blocked, first_objects, first_points, sensor_plugin
+from simgen.renderer import RenderScene, sensor_plugin
 
 BESIDE_EDGE_PX = 0.01
 """Rays so far from a pixel's centre pass beside an edge between triangles that the centre meets exactly: much
@@ -87,7 +85,7 @@ def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
     z_mm = np.where(hit, point[..., 2], np.inf)
     if render_scene.has_instances:  # the renderer's output has the shape within the instance
         towards = camera.towards(*np.indices(hit.shape).reshape(2, -1))
-        object_id = first_objects(render_scene, camera.position_mm, towards).reshape(hit.shape)
+        object_id = render_scene.first_objects(camera.position_mm, towards).reshape(hit.shape)
     else:
         object_id = render_scene.object_of_shape[shape]
     hits = FirstHits(z_mm.astype(np.float32), object_id.astype(np.int16), facing.astype(np.float32))
@@ -109,7 +107,7 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
         return
     down, right = BESIDE_EDGE_PX * np.array([[-1, -1, 1, 1], [-1, 1, -1, 1]])
     rays = camera.towards(row[:, None] + down, col[:, None] + right)  # (N, 4, 3)
-    points, normals, ids = first_points(render_scene, camera.position_mm, rays.reshape(-1, 3))
+    points, normals, ids = render_scene.first_points(camera.position_mm, rays.reshape(-1, 3))
     depth = points[:, 2].reshape(-1, 4)
     number = np.argsort(depth, axis=1)[:, 1]  # the second nearest
     is_nearer = depth < nearer[row, col, None]
@@ -124,20 +122,6 @@ def _mend_edges(render_scene: RenderScene, camera: Camera, hits: FirstHits) -> N
     hits.object_id[row, col], hits.normal[row, col] = ids[second_nearest], normal
 
 
-def over_squares(pick: np.ufunc, values: np.ndarray, side: int) -> np.ndarray:
-    """`pick`, as `numpy.maximum`, over every square of `side` x `side` places that lies in a map (H, W).
-
-    (H - `side` + 1, W - `side` + 1): pad the map first for values up to its border.
-
-    >>> over_squares(np.maximum, np.array([[1, 0, 0, 2], [0, 3, 0, 0]]), 2).tolist()
-    [[3, 3, 2]]
-    """
-    for _ in range(2):  # along rows, then along columns
-        count = len(values) - side + 1
-        values = reduce(pick, (values[first : first + count] for first in range(side))).T
-    return values
-
-
 def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -> np.ndarray:
     """Share (H, W) float32 of each pixel's square in which rays hit the object that its centre hits first.
 
@@ -145,16 +129,18 @@ def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -
     pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its share is
     1: what is lost is only what passes between the centres of pixels.
     """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
     share, number = np.ones(object_id.shape, dtype=np.float32), np.arange(COVERAGE_SAMPLES)
     down = (number + 0.5) / COVERAGE_SAMPLES - 0.5
     right = (number * LATTICE_GENERATOR % COVERAGE_SAMPLES + 0.5) / COVERAGE_SAMPLES - 0.5
     # No object has the id -1: what stands beyond the frame is another for all we know.
-    framed = np.pad(object_id, 1, constant_values=-1)
-    row, col = np.nonzero(over_squares(np.maximum, framed, 3) != over_squares(np.minimum, framed, 3))
+    most, least = (pick(object_id, 3, mode="constant", cval=-1) for pick in (maximum_filter, minimum_filter))
+    row, col = np.nonzero(most != least)
     for start in range(0, row.size, PIXELS_AT_ONCE):
         i, j = row[start : start + PIXELS_AT_ONCE], col[start : start + PIXELS_AT_ONCE]
         rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)
-        hit_id = first_objects(render_scene, camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
+        hit_id = render_scene.first_objects(camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
         share[i, j] = (hit_id == object_id[i, j, None]).mean(axis=1)
     return share
 
@@ -187,7 +173,7 @@ def visible_views(
         is_visible = camera.on_film(point) & (normal @ camera.position_mm > facing)
         tested = np.flatnonzero(is_visible & may_be_blocked)
         if tested.size:
-            is_visible[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
+            is_visible[tested] = ~render_scene.blocked(start[tested], camera.position_mm)
         count += is_visible
         traced += tested.size
         report("visibility", done, grid.view_count)
@@ -222,7 +208,5 @@ def _can_be_blocked(render_scene: RenderScene, rig: Rig, start: np.ndarray) -> n
 
 def shape_boxes_mm(render_scene: RenderScene) -> np.ndarray:
     """Bounding boxes (N, 2, 3) of the renderer's shapes in the world: least and largest X, Y, Z."""
-    boxes: list[Any] = [shape.bbox() for shape in render_scene.scene.shapes()]
-    corners = [[np.ravel(box.corner(number)) for number in range(8)] for box in boxes]
-    corners_mm = render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
+    corners_mm = render_scene.corners_mm
     return np.stack([corners_mm.min(axis=1), corners_mm.max(axis=1)], axis=1)

@@ -10,8 +10,7 @@ from PIL import Image
 
 from pcii.base import LUMINANCE, InputError, srgb_to_linear
 from simgen.assets import Triangles, ply_bytes
-from simgen.renderer import backend
-from simgen.renderer.mitsuba_surfaces import light_spectrum
+from simgen.renderer import backend, light_spectrum
 from simgen.spectral import illuminant, integral, observer
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pcii.types import CameraGrid
-from simgen.photons import MAX_RAYS, Majorant, fit, layers_for, tile_px_for
-from simgen.photons.disparity_layers import Samples
+from simgen.photons import MAX_RAYS, Majorant, Samples, fit, layers_for, tile_px_for
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
 DIM = np.array([0.02, 0.01, 0.03])

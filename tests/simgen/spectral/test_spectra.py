@@ -14,15 +14,16 @@ from simgen.base import validate
 from simgen.spec import Scene
 from simgen.spectral import (
     WAVELENGTH_NM,
+    colour_science,
     filters_for,
     illuminant,
     integral,
+    linear_srgb,
     observer,
     patch,
     patch_names,
     sensitivity,
 )
-from simgen.spectral.spectra import colour_science, linear_srgb
 
 
 @pytest.mark.parametrize("name", ["D65", "A", "FL2", "E"])

@@ -1,18 +1,43 @@
-"""Where things stand in the renderer, and their shapes: Mitsuba's sphere and rectangle, or meshes.
+"""Objects in the renderer: where they stand, their shapes and surfaces, their colours as textures.
+
+Shapes are Mitsuba's sphere and rectangle, or meshes; plugins are those of the variant that is set.
 
 Cameras and objects are brought to the axes of a Mitsuba file that a scene refers to: not all of Mitsuba's
 plugins could be moved (in 3.9 a turned `sdfgrid` is cut off, and scaled curves keep their radius).
 """
 
+import math
+import os
+from collections.abc import Hashable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from pcii.base import InputError
-from simgen.assets import Assets, Triangles, cut_out, globe, triangles_of
-from simgen.spec import Card, Material, Mesh, SceneObject, Shape, Sphere
+from pcii.base import InputError, srgb_to_linear
+from simgen.assets import Assets, Triangles, cut_out, globe, paint, triangles_of
+from simgen.renderer.backend import is_spectral
+from simgen.spec import (
+    Backdrop,
+    Box,
+    Card,
+    Cylinder,
+    Glass,
+    Material,
+    Matt,
+    Mesh,
+    Metal,
+    Plastic,
+    Principled,
+    Reflectance,
+    SceneObject,
+    Shape,
+    Sphere,
+    is_clear,
+)
+from simgen.spectral import spectra
 
 SMALL_BALL_SHARE = 0.02
 """A ball that shines is a mesh if its radius is a smaller share of the scene's size. Mitsuba aims at its own
@@ -93,7 +118,7 @@ def shape_plugin(
     T, pose, shape = mi.ScalarTransform4f, frame.pose(mi, pose_of(mi, thing)), thing.shape
     matrix, is_whole = np.array(pose.matrix, dtype=np.float64), thing.material.opacity is None
     if isinstance(shape, Card) and is_whole:
-        to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
+        to_world = pose @ _card_pose(mi, shape.width_mm, shape.height_mm)
         return {"type": "rectangle", "to_world": to_world} | parts
     if isinstance(shape, Sphere) and is_whole:
         if "emitter" in parts and shape.radius_mm < SMALL_BALL_SHARE * reach_mm:
@@ -152,10 +177,18 @@ def check_texcoords(where: str, shape: Shape, assets: Assets) -> None:
         raise InputError(f"{where}: {shape.file!r} has no texture coordinates; add them, or leave it out")
 
 
-def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
+def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces -Z, with v towards -Y."""
     T = mi.ScalarTransform4f
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
+
+
+def backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, Any]:
+    """A matt wall, seen from either side."""
+    matt = {"type": "diffuse", "reflectance": _reflectance_plugin(mi, wall.reflectance)}
+    pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
+    to_world = pose @ _card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
+    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
 
 
 def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
@@ -178,3 +211,117 @@ def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, An
         values["vertex_texcoords"] = (texcoords * [1, -1] + [0, 1]).astype(np.float32).ravel()
     values.update()
     return mesh
+
+
+def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
+    """The pixels of each object's pattern (see `paint`), None if it carries none; several at a time."""
+
+    def pixels(thing: SceneObject) -> np.ndarray | None:
+        texture = thing.material.texture
+        return None if texture is None or isinstance(texture, str) else paint(texture, aspect_of(thing.shape))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from pool.map(pixels, things)
+
+
+def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
+    """A key that is equal for objects that can share a surface, on which pictures lie alike."""
+    has_texcoords = not isinstance(shape, Mesh) or assets.meshes[shape.file].texcoords is not None
+    return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), has_texcoords
+
+
+def surface_plugin(
+    mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
+) -> dict[str, Any]:
+    """The surface of an object of this shape, on both sides; `pattern` are its pixels if it carries one."""
+
+    def texture(where: str, pixels: np.ndarray, raw: bool = True) -> dict[str, Any]:
+        check_texcoords(where, shape, assets)
+        return texture_plugin(mi, pixels, shape, raw=raw, tiled=material.tiled)
+
+    def reflectance() -> dict[str, Any]:
+        if material.reflectance is not None:
+            return _reflectance_plugin(mi, material.reflectance)
+        pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
+        assert pixels is not None
+        # Pixels are linear, so they are colours as they stand, which spectral variants make spectra.
+        return texture("material.texture", pixels, raw=not is_spectral(mi))
+
+    def number_or_texture(field: str) -> float | dict[str, Any]:
+        value, where = getattr(material.finish, field), f"material.finish.{field}"
+        return texture(where, assets.numbers(value, where)) if isinstance(value, str) else value
+
+    match material.finish:
+        case Matt():
+            surface = {"type": "diffuse", "reflectance": reflectance()}
+        case Plastic(roughness=alpha):
+            surface = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha}
+            surface["diffuse_reflectance"] = reflectance()
+        case Metal(name=name, roughness=alpha):
+            surface = {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+        case Glass(refractive_index=index):
+            pane = isinstance(shape, Card)
+            surface = {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
+        case Principled(refractive_index=index, clearcoat_gloss=gloss):
+            surface = {"type": "principled", "base_color": reflectance(), "eta": index}
+            surface |= {field: number_or_texture(field) for field in ("metallic", "roughness")}
+            surface["spec_trans"] = number_or_texture("transmission")
+            surface |= {"clearcoat": number_or_texture("clearcoat"), "clearcoat_gloss": gloss}
+    if material.normal_map is not None:
+        tilts = texture("material.normal_map", assets.stored(material.normal_map))
+        surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
+    return surface if is_clear(material.finish) else {"type": "twosided", "bsdf": surface}
+
+
+def texture_plugin(
+    mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool, tiled: bool = False
+) -> dict[str, Any]:
+    """Pixels (H, W, C) as the texture of this shape; `raw` ones are no colours that become spectra."""
+    if isinstance(shape, Card):
+        pixels = pixels[::-1]  # a rectangle's v runs up, an image's rows down
+    pixels = np.ascontiguousarray(pixels)
+    # A bitmap is converted, which takes as long as tracing 500 000 paths; only that can become spectra.
+    source: dict[str, Any] = {"data": mi.TensorXf(pixels)} if raw else {"bitmap": linear_bitmap(mi, pixels)}
+    # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
+    wrap_mode = "repeat" if tiled or isinstance(shape, Sphere) else "clamp"
+    return source | {"type": "bitmap", "raw": raw, "filter_type": "bilinear", "wrap_mode": wrap_mode}
+
+
+def linear_bitmap(mi: Any, pixels: np.ndarray) -> Any:
+    """Linear pixels (H, W, C) as Mitsuba's bitmap."""
+    bitmap = mi.Bitmap(pixels)
+    bitmap.set_srgb_gamma(False)  # otherwise a spectral variant takes them for sRGB
+    return bitmap
+
+
+def aspect_of(shape: Shape) -> float:
+    """Width over height of what a shape's texture is laid on: a sphere's and a cylinder's go once round."""
+    match shape:
+        case Card() | Box():
+            return shape.width_mm / shape.height_mm
+        case Sphere():
+            return 2.0
+        case Cylinder():
+            return 2 * math.pi * shape.radius_mm / shape.length_mm
+        case _:
+            return 1.0
+
+
+def _reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
+    """One reflectance all over. In a spectral variant sRGB is turned into a smooth spectrum by Mitsuba."""
+    if isinstance(reflectance, tuple):
+        return {"type": "rgb", "value": srgb_to_linear(np.array(reflectance)).tolist()}
+    if isinstance(reflectance, str):
+        spectrum = spectra.patch(reflectance)
+    else:
+        spectrum = spectra.resampled(reflectance.wavelength_nm, reflectance.value)
+    if is_spectral(mi):
+        return spectrum_plugin(spectrum)
+    return {"type": "rgb", "value": spectra.linear_srgb(spectrum).tolist()}
+
+
+def spectrum_plugin(values: np.ndarray) -> dict[str, Any]:
+    """Values (N,) at evenly spaced wavelengths."""
+    first, last = spectra.WAVELENGTH_NM[[0, -1]].tolist()
+    numbers = ", ".join(map(repr, values.tolist()))
+    return {"type": "regular", "wavelength_min": first, "wavelength_max": last, "values": numbers}

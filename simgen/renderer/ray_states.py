@@ -1,12 +1,60 @@
-"""How rays of compiled backends carry light: as three colours, or four wavelengths for a pixel's filter."""
+"""What each ray of compiled backends carries: random numbers, and light in colours or at wavelengths.
+
+Samplers of Mitsuba take seeds of 32 bits, which some 80 000 datasets are enough to make equal in two of them.
+Random numbers here have seeds of any size, and come of arithmetic of integers alone, so that they are the
+same on every machine. Light is carried as three colours, or at four wavelengths for a pixel's filter.
+"""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pcii.base import LUMINANCE
-from simgen.renderer.backend import floats, gathered, load_drjit
+from simgen.renderer.backend import floats, gathered, load_drjit, opaque
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral import CELLS, HEROES, WAVELENGTH_NM, Filters
+
+GOLDEN = 0x9E3779B97F4A7C15
+"""2^64 over the golden ratio: the step of SplitMix64."""
+
+
+@dataclass
+class RandomNumbers:
+    """PCG32 (O'Neill 2014) in each lane; what Mitsuba asks a sampler for, and a state of Dr.Jit's loops."""
+
+    mi: Any
+    generator: Any
+
+    def next_1d(self, active: Any = True) -> Any:
+        """A number in [0, 1) in each lane; the streams of lanes that are not active stay where they are."""
+        return self.generator.next_float32(active)
+
+    def next_2d(self, active: Any = True) -> Any:
+        """Two numbers in [0, 1) in each lane."""
+        return self.mi.Point2f(self.next_1d(active), self.next_1d(active))
+
+
+def streams_for(mi: Any, seed: int, size: int, *, part: int = 0) -> RandomNumbers:
+    """Streams for `size` lanes, of this `part` of the work that `seed` is for.
+
+    State and increment of each lane, of 64 and 63 bits, are numbers of SplitMix64 (Steele et al. 2014), which
+    begins at 128 bits that seed and part decide.
+    """
+    begins = np.random.SeedSequence(seed, spawn_key=(part,)).generate_state(2, np.uint64)
+    step = (load_drjit().arange(mi.UInt64, size) + 1) * mi.UInt64(GOLDEN)
+    state, increment = (_mixed(mi, opaque(mi.UInt64, int(begin)) + step) for begin in begins)
+    generator = mi.PCG32()
+    generator.seed(state, increment)
+    return RandomNumbers(mi, generator)
+
+
+def _mixed(mi: Any, number: Any) -> Any:
+    """The bits of each number mixed; every number has one that becomes it."""
+    number = (number ^ (number >> 30)) * mi.UInt64(0xBF58476D1CE4E5B9)
+    number = (number ^ (number >> 27)) * mi.UInt64(0x94D049BB133111EB)
+    return number ^ (number >> 31)
 
 
 class Light:
@@ -30,6 +78,10 @@ class Light:
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
         """Colours to follow rays in, one after the other, so that together they show all."""
         yield colour
+
+    def in_own_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """What each pixel gets, in its own colour, of radiance that rays carry."""
+        return _of_colour(self.per_colour(radiance, colour, wavelength_sample), colour)
 
     def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
         """Radiance in each colour that these wavelengths show, 0 in the others; luminance without a CFA."""
@@ -58,7 +110,7 @@ class SpectralLight(Light):
         # It has the spectrum of most of the light.
         wavelengths_nm, _ = self._draw(colour, wavelength_sample)
         white = gathered(self.white, colour)
-        relative = load_drjit().select(white > 0, of_colour(ambient, colour) / white, 0)
+        relative = load_drjit().select(white > 0, _of_colour(ambient, colour) / white, 0)
         return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in wavelengths_nm))
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
@@ -99,7 +151,7 @@ def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     return Light(mi, cfa) if filters is None else SpectralLight(mi, filters)
 
 
-def of_colour(values: Any, colour: Any) -> Any:
+def _of_colour(values: Any, colour: Any) -> Any:
     """Each element's value in its own colour, of `values` in all colours."""
     first, *others = values
     if not others:
