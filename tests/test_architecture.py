@@ -70,7 +70,6 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.dataset.resources",
     "simgen.spec.recipe_files",
-    "simgen.spec.sweeps",
 }
 
 

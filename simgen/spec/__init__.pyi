@@ -16,13 +16,12 @@ from .recipe import MOST_PHOTONS as MOST_PHOTONS, Photons as Photons, Products a
 from .recipe import Publication as Publication, Recipe as Recipe, Render as Render, Sensor as Sensor
 from .recipe import ViewPass as ViewPass
 from .recipe_files import RecipeFile as RecipeFile, load_recipe as load_recipe, override as override
-from .recipe_files import recipe_file as recipe_file, recipe_names as recipe_names
-from .scene import Backdrop as Backdrop, MOST_OBJECTS as MOST_OBJECTS, NAME as NAME, Scene as Scene
-from .scene import SceneObject as SceneObject, check_unscored as check_unscored
-from .scene import checked_folder as checked_folder, names_of_objects as names_of_objects
-from .scene import scene_files as scene_files, scene_of as scene_of
+from .recipe_files import Sweep as Sweep, load_sweep as load_sweep, recipe_file as recipe_file
+from .recipe_files import recipe_names as recipe_names
+from .scene import Backdrop as Backdrop, Box as Box, Card as Card, Cylinder as Cylinder
+from .scene import MOST_OBJECTS as MOST_OBJECTS, Mesh as Mesh, NAME as NAME, Scene as Scene
+from .scene import SceneObject as SceneObject, Shape as Shape, Sphere as Sphere
+from .scene import check_unscored as check_unscored, checked_folder as checked_folder
+from .scene import names_of_objects as names_of_objects, scene_files as scene_files, scene_of as scene_of
 from .scene_lookup import drawn_scenes as drawn_scenes, is_drawn as is_drawn, is_scene as is_scene
 from .scene_lookup import load_scene as load_scene, scene_names as scene_names
-from .shapes import Box as Box, Card as Card, Cylinder as Cylinder, Mesh as Mesh, Shape as Shape
-from .shapes import Sphere as Sphere
-from .sweeps import Sweep as Sweep, load_sweep as load_sweep
