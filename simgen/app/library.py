@@ -191,9 +191,7 @@ def _draw_from_rendered(capture: Capture, counting: Plan, report: Report) -> Pho
         image, variance = halved_view(capture, k, l, counting.samples)
         return sense(image, capture.cfa), variance
 
-    return draw_from_views(
-        capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], counting, report
-    )[0]
+    return draw_from_views(capture, view_of, counting, report)[0]
 
 
 def render(

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from pcii.store import DATASET_FOLDER, hash_file, hash_json
+from pcii.store import DATASET_FOLDER, PACKAGE, hash_file, hash_json, software
 from simgen.assets import read_assets
 from simgen.base import asset
 from simgen.base import random_streams as seeds
 from simgen.cameras import rig_of
-from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import available_bytes, shortage
 from simgen.photons import Capture, Plan, plan_counts
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import dark_map, photons_per_radiance, sensitivities
 from simgen.spec import Analysis, Recipe, Scene, checked_folder, load_scene, scene_files
 
+DECISIVE = (PACKAGE, "mitsuba")
+"""Packages whose versions are part of what identifies a dataset, with its recipe and scene."""
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""
 
@@ -82,7 +83,7 @@ class Prepared:
         content = self.scene_content | {
             "recipe": self.recipe_of_data,
             "format_version": DATASET_FOLDER.version,
-            "software": decisive_versions(),
+            "software": software.versions(*DECISIVE),
         }
         return hash_json(content)
 

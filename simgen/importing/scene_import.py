@@ -13,9 +13,8 @@ from pcii.base import InputError, new_folder_safely
 from pcii.exchange import write_png
 from simgen.assets import Triangles, ply_bytes
 from simgen.base import LARGEST_TOML_BYTES, shorten, toml_text, validate
-from simgen.importing.foreign_scene import ForeignScene, Part
+from simgen.importing.foreign_scene import MESH_KINDS, ForeignScene, MeshScene, Part
 from simgen.importing.gltf_scene import GltfScene
-from simgen.importing.mesh_scene import MESH_KINDS, MeshScene
 from simgen.renderer import backend, reference_to
 from simgen.spec import MitsubaFile, MitsubaXml, Scene, check_unscored, names_of_objects
 

@@ -12,7 +12,7 @@ NamedIlluminant = Annotated[
     Field(
         max_length=40,
         description="a CIE illuminant by name, such as D65, A or FL2",
-        json_schema_extra=lambda schema: schema.update(enum=illuminant_names()),
+        json_schema_extra=lambda schema: schema.update(enum=[*illuminant_names()]),
     ),
     AfterValidator(known_illuminant),
 ]

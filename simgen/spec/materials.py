@@ -235,7 +235,7 @@ PatchName = Annotated[
     str,
     Field(
         description="one of the 24 ColorChecker patches, such as 'dark skin'",
-        json_schema_extra=lambda schema: schema.update(enum=patch_names()),
+        json_schema_extra=lambda schema: schema.update(enum=[*patch_names()]),
     ),
     AfterValidator(known_patch),
 ]

@@ -208,9 +208,8 @@ def test_noise_of_views_is_measured_and_too_much_is_refused() -> None:
     shape = made.grid.height, made.grid.width
 
     def draw(variance: float) -> dict[str, Any]:
-        return draw_from_views(
-            capture, lambda k, l: np.ones(shape), lambda k, l: np.full(3, variance), plan, lambda *_: None
-        )[1]
+        view = np.ones(shape), np.full(3, variance)
+        return draw_from_views(capture, lambda k, l: view, plan, lambda *_: None)[1]
 
     pixels = shape[0] * shape[1]
     # Added variance g^2 v beside g pixels, g = 500 / pixels.
