@@ -18,25 +18,13 @@ from pcii.base import (
 )
 from pcii.exchange import export
 from pcii.store import Half
-from simgen.app.scene_commands import (
-    Json,
-    Out,
-    Overrides,
-    TrustPython,
-    check,
-    import_scene,
-    new_recipe,
-    new_scene,
-    preview,
-    scenes,
-    schema,
-)
+from simgen.app.scene_commands import SCENE_COMMANDS, Json, Out, Overrides, TrustPython
 
 app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
-for command in (scenes, schema, check, preview, new_scene, new_recipe, import_scene, export):
+for command in (*SCENE_COMMANDS, export):
     app.command(command)
 
 benchmark = App(

@@ -306,3 +306,6 @@ def import_scene(
     for line in import_scene(file, out, **place, emission_unit=emission_unit, unscored=unscored).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")
+
+
+SCENE_COMMANDS = scenes, schema, check, preview, new_scene, new_recipe, import_scene

@@ -118,12 +118,6 @@ class Facts:
         return self.target.recipe.analysis.z_mm or tuple(planes)
 
 
-def listed(names: list[str], most: int = 6) -> str:
-    """`a, b and 3 more`."""
-    text = ", ".join(names[:most])
-    return text if len(names) <= most else f"{text} and {len(names) - most} more"
-
-
 def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"

@@ -16,7 +16,7 @@ from simgen.cameras import (
     shares_without,
     spread_px_mm,
 )
-from simgen.check.scene_probe import Facts, Finding, ObjectFacts, listed
+from simgen.check.scene_probe import Facts, Finding, ObjectFacts
 from simgen.spec import is_clear
 
 MAX_MAGNIFICATION = 10.0
@@ -40,7 +40,7 @@ def sight_findings(facts: Facts) -> Iterator[Finding]:
     by_name = {thing.name: _object_finding(facts, thing) for thing in facts.objects}
     whole = [thing.name for thing in facts.visible_objects if by_name[thing.name] is None]
     if whole:
-        yield Finding("ok", "objects", f"the centre and the corner cameras see {listed(whole)}")
+        yield Finding("ok", "objects", f"the centre and the corner cameras see {_listed(whole)}")
     yield from (finding for finding in by_name.values() if finding is not None)
     if not facts.objects:
         yield Finding("warn", "objects", "there are none", "add [[objects]] to the scene")
@@ -49,7 +49,7 @@ def sight_findings(facts: Facts) -> Iterator[Finding]:
         yield _too_near("backdrop", f"it is at z = {scene.backdrop.z_mm:g} mm")
     glass = [thing.name for thing in scene.objects if is_clear(thing.material.finish)]
     if glass and depth < MIN_GLASS_DEPTH:
-        text = f"paths of {depth} segments end inside {listed(glass)}, whose glass looks dark"
+        text = f"paths of {depth} segments end inside {_listed(glass)}, whose glass looks dark"
         yield Finding("warn", "glass", text, f"set render.max_depth to {MIN_GLASS_DEPTH} or more")
     for number in facts.lamps_away:
         text, remedy = f"lamp {number} shines away from every object", f"turn lights[{number - 1}].target_mm"
@@ -169,7 +169,7 @@ def _focus_findings(facts: Facts) -> Iterator[Finding]:
         f"of {facts.scored[best.argmin()].name}, the object least in focus, {best.min():.0%} is in focus at "
         f"the best of the planes {names} mm"
     )
-    remedy = f"add {listed(blurred)} to analysis.z_mm" if blurred else ""
+    remedy = f"add {_listed(blurred)} to analysis.z_mm" if blurred else ""
     yield Finding("warn" if blurred else "ok", "focus", text, remedy)
     if not analysis.z_mm:
         text = "neither the scene nor the recipe names depths to look at, and pcii asks for --z-mm"
@@ -185,7 +185,7 @@ def _focus_findings(facts: Facts) -> Iterator[Finding]:
 
 
 def _in_mm(planes_mm: Iterable[float]) -> str:
-    return listed([f"{z:g}" for z in planes_mm])
+    return _listed([f"{z:g}" for z in planes_mm])
 
 
 def _depths_of(things: Sequence[ObjectFacts]) -> tuple[float, float]:
@@ -225,3 +225,9 @@ def _disparity(facts: Facts, z_mm: float) -> str:
     if np.isclose(across_px, down_px):
         return f"{across_px:.2f} px"
     return f"{across_px:.2f} x {down_px:.2f} px"
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    """`a, b and 3 more`."""
+    text = ", ".join(names[:most])
+    return text if len(names) <= most else f"{text} and {len(names) - most} more"

@@ -38,7 +38,7 @@ from pcii.store import (
 )
 from simgen.base import Positive, Strict, find_all, read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection
-from simgen.dataset.generation import versions
+from simgen.dataset.prepared import versions
 from simgen.renderer import backend
 from simgen.spec import Publication, Recipe, load_recipe
 

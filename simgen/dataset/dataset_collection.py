@@ -30,8 +30,8 @@ from pcii.store import (
     software,
     write_index,
 )
-from simgen.dataset.generation import Reuse, find_finished, make, other_dataset, other_versions
-from simgen.dataset.prepared import DECISIVE, prepare
+from simgen.dataset.generation import Reuse, find_finished, make
+from simgen.dataset.prepared import DECISIVE, other_dataset, other_versions, prepare
 from simgen.renderer import backend
 from simgen.spec import Recipe
 

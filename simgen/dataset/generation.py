@@ -5,7 +5,7 @@ import math
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -36,10 +36,9 @@ from pcii.store import (
     pack_arrays,
     read_listed,
     read_written_manifest,
-    software,
     write_manifest,
 )
-from simgen.dataset.prepared import DECISIVE, Prepared, prepare
+from simgen.dataset.prepared import DECISIVE, Prepared, other_dataset, prepare, versions
 from simgen.dataset.rendered_views import (
     RENDERED,
     RenderedViews,
@@ -255,17 +254,6 @@ def _skipped(
     return entries
 
 
-def versions() -> dict[str, str]:
-    """Versions of the packages that make datasets."""
-    return software.versions(*DECISIVE, "drjit", "numpy", "zarr")
-
-
-def other_versions(recorded: Mapping[str, str]) -> str:
-    """How the decisive versions recorded differ from those here, in words; empty if they are the same."""
-    known = {name: number for name, number in recorded.items() if name in DECISIVE}
-    return software.differences(known, software.versions(*DECISIVE))
-
-
 def find_finished(out: Path, identity: str, *, content: bool = True) -> DatasetManifest | None:
     """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
 
@@ -335,15 +323,3 @@ def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]
             f"{out}: was begun with {before['variant']}, and this machine now runs {engine['variant']}, "
             f"whose pixels differ; delete the folder {out} to start again, or set SIMGEN_BACKEND"
         )
-
-
-def other_dataset(out: Path, what: str, recorded: Mapping[str, str]) -> InputError:
-    """That a folder holds something of other software or, if its versions agree, of another recipe."""
-    differences = other_versions(recorded)
-    if not differences:
-        text = f"{out}: holds the {what} of another recipe or scene, or of other files that they name"
-        return InputError(f"{text}; name a new or empty folder")
-    return InputError(
-        f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a new or "
-        "empty folder, or install that software"
-    )

@@ -221,15 +221,15 @@ def meshes(random: Random) -> Scene:
     planes = plane_depths(random, random.choice([2, 2, 3, 4]))
     objects = Objects()
     for number in range(random.randint(2, 6)):
-        make = random.choice([parts.blob, parts.head, parts.tube, parts.tube, parts.spindle])
+        make = random.choice(parts.CURVED)
         size = draw.log_uniform(random, 18, 85)
-        z = planes[number % len(planes)] + (0.0 if make is parts.tube else 0.6 * size)
-        place = random.uniform(-100, 100), random.uniform(-80, 80), z
-        turn = 40.0 if make is parts.head else random.choice([25.0, 180.0])
+        kind, z = make.__name__, planes[number % len(planes)]
+        behind = 0.0 if kind == "tube" else 0.6 * size
+        place = random.uniform(-100, 100), random.uniform(-80, 80), z + behind
+        turn = 40.0 if kind == "head" else random.choice([25.0, 180.0])
         rotation = random.uniform(-turn, turn) / 2, random.uniform(-turn, turn), random.uniform(-turn, turn)
         material = random.choice([draw.plain, parts.any_material, parts.any_material, draw.glossy])(random)
-        name, shape = f"{make.__name__}-{number}", parts.mesh_of(make(random), size)
-        objects.add(name, place, rotation, shape, material)
+        objects.add(f"{kind}-{number}", place, rotation, parts.mesh_of(make(random), size), material)
     parts.add_backwall(random, objects, planes[-1])
     return _in_any_light(random, "Curved things", objects, planes)
 

@@ -252,6 +252,10 @@ def tube(random: Random) -> np.ndarray:
     return curve[:, None] + thick * (np.cos(angle) * outward[:, None] + np.sin(angle) * sideways[:, None])
 
 
+CURVED = blob, head, tube, tube, spindle
+"""What makes curved surfaces, tubes twice as often as others."""
+
+
 def _around(line: np.ndarray, columns: int) -> np.ndarray:
     """The surface (rows, columns + 1, 3) of a line (rows, 2) of radii and heights about the upright axis."""
     angle = np.linspace(-math.pi, math.pi, columns + 1)

@@ -1,5 +1,5 @@
-"""A scene of another program, whatever its format: objects, lamps, cameras, and where it stands in ours; and files
-of meshes alone as such scenes: OBJ by groups and materials, STL by solids, PLY."""
+"""A scene of another program: objects, lamps, cameras, and where it stands in ours; and files of meshes alone
+as such scenes: OBJ by groups and materials, STL by solids, PLY."""
 
 import re
 from collections import Counter
