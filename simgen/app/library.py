@@ -25,8 +25,8 @@ from simgen.dataset import (
     prepare_scene,
 )
 from simgen.dataset import dataset_collection as collections
-from simgen.photons import Capture, Plan, thin_photons
-from simgen.sensor import PhotonTable, counts_of, detect, read_out
+from simgen.photons import thin_photons
+from simgen.sensor import counts_of, detect, read_out
 from simgen.spec import (
     CalibrationErrors,
     Lens,
@@ -165,10 +165,16 @@ def draw_photons(
     capture = prepared.capture(render_scene)
     counting = prepared.plan(capture)
     check_resources(recipe, counting, Path(), prepared.map_counts)
+
+    @cache
+    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
+        image, variance = halved_view(capture, k, l, counting.samples)
+        return sense(image, capture.cfa), variance
+
     if counting.thins:
         arrivals, _ = thin_photons(capture, counting, report)
     else:
-        arrivals = _draw_from_rendered(capture, counting, report)
+        arrivals, _ = draw_from_views(capture, view_of, counting, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed, capture.dark_map)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
@@ -181,17 +187,6 @@ def draw_photons(
     covered = coverage(render_scene, centre_camera(grid), centre.object_id)
     maps, names, unscored = (centre.z_mm, centre.object_id), render_scene.names, render_scene.unscored
     return counts, Truth(*maps, names, photons, centre.normal, covered, unscored=unscored)
-
-
-def _draw_from_rendered(capture: Capture, counting: Plan, report: Report) -> PhotonTable:
-    """Photons where they are too many to be drawn one by one: of views that are rendered in memory."""
-
-    @cache
-    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
-        image, variance = halved_view(capture, k, l, counting.samples)
-        return sense(image, capture.cfa), variance
-
-    return draw_from_views(capture, view_of, counting, report)[0]
 
 
 def render(

@@ -118,12 +118,11 @@ def read_environment(path: Path) -> np.ndarray:
 
 def read_mesh(path: Path) -> Triangles:
     """The mesh in a PLY or OBJ file; `InputError` that names the file if it has none that can be used."""
-    readers = {".ply": _read_ply, ".obj": _read_obj}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
+    kind = path.suffix.lower()
+    if kind not in (".ply", ".obj"):
         raise InputError(f"{path}: this file is not named .ply or .obj, the kinds of mesh that are read")
     try:
-        return reader(path)
+        return _read_ply(path) if kind == ".ply" else obj_parts(path.read_bytes(), as_one=True)[1]["", ""]
     except ValueError as fault:
         raise InputError(f"{path}: this file {shorten(str(fault))}") from None
 
@@ -188,11 +187,6 @@ def _parsed_ply(path: Path) -> Any:
         with contextlib.suppress(PlyElementParseError):  # other polygons, or a broken file
             return PlyData.read(str(path), known_list_len={"face": {name: 3}})
     return PlyData.read(str(path))
-
-
-def _read_obj(path: Path) -> Triangles:
-    """All that is in an OBJ file as one mesh; raises `ValueError` as `obj_parts` does."""
-    return obj_parts(path.read_bytes(), as_one=True)[1]["", ""]
 
 
 def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tuple[str, str], Triangles]]:
