@@ -219,7 +219,13 @@ def load_sweep(
     `InputError` for a recipe that is missing or wrong, for a field without values, with the same value twice,
     or swept twice, and for more than `MOST_DATASETS`.
     """
-    written, source, recipe_folder = _read(name_or_path, overrides, trust_python)
+    file = recipe_file(name_or_path)
+    if (file is None or file == Path(name_or_path)) and is_scene(name_or_path):
+        written: dict[str, Any] = {"scene": name_or_path}
+        override(written, overrides)
+        source, recipe_folder = f"a recipe of the scene {name_or_path}", Path()
+    else:
+        written, source, recipe_folder = _read_recipe(name_or_path, overrides, trust_python=trust_python)
     for option, field, count in (("scenes", "scene_number", scenes), ("seeds", "seed", seeds)):
         if count is not None:
             first = written.get(field, 0)
@@ -244,17 +250,6 @@ def load_sweep(
         raise InputError(f"{source}: {len(sweep)} datasets; at most {MOST_DATASETS} can be made at once")
     sweep.check()
     return sweep
-
-
-def _read(
-    name_or_path: str, overrides: Sequence[str], trust_python: bool
-) -> tuple[dict[str, Any], str, Path]:
-    file = recipe_file(name_or_path)
-    if (file is None or file == Path(name_or_path)) and is_scene(name_or_path):
-        values: dict[str, Any] = {"scene": name_or_path}
-        override(values, overrides)
-        return values, f"a recipe of the scene {name_or_path}", Path()
-    return _read_recipe(name_or_path, overrides, trust_python=trust_python)
 
 
 def _put(values: dict[str, Any], field: str, value: Any) -> None:
