@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from simgen.dataset.dataset_folder import versions as dataset_versions
+from simgen.dataset.prepared import versions as dataset_versions
 from simgen.renderer import backend
 
 PEERS = ("scipy", "numba", "colour-science")

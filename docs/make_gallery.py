@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from simgen.app.pictures import draw_preview
-from simgen.check import load_target
+from simgen.app import preview
 from simgen.spec import load_recipe, load_scene
 
 DOCS = Path(__file__).resolve().parent
@@ -48,8 +47,8 @@ def main() -> None:
     folder = DOCS / "gallery"
     folder.mkdir(exist_ok=True)
     for name in scene_names():
-        target = load_target(str(SCENES / name))
-        draw_preview(target, SAMPLES_PER_PIXEL).write(folder / f"{name}.jpg", DOTS_PER_INCH)
+        picture = preview(SCENES / name, samples_per_pixel=SAMPLES_PER_PIXEL)
+        picture.write(folder / f"{name}.jpg", DOTS_PER_INCH)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
 
 

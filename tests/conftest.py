@@ -36,7 +36,8 @@ def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """That of `small_benchmark`: two scenes of 2 x 2 views, with the certificate that publishes it."""
     from small_benchmark import written
 
-    from simgen.dataset import CERTIFICATE, certify, make_benchmark
+    from pcii.store import CERTIFICATE
+    from simgen.dataset import certify, make_benchmark
 
     folder = tmp_path_factory.mktemp("benchmark")
     definition, file = written(folder)

@@ -62,7 +62,6 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.dataset.resources",
     "simgen.spec.recipe_files",
-    "simgen.spec.sweeps",
 }
 
 

@@ -18,25 +18,13 @@ from pcii.base import (
 )
 from pcii.exchange import export
 from pcii.store import Half
-from simgen.app.scene_commands import (
-    Json,
-    Out,
-    Overrides,
-    TrustPython,
-    check,
-    import_scene,
-    new_recipe,
-    new_scene,
-    preview,
-    scenes,
-    schema,
-)
+from simgen.app.scene_commands import SCENE_COMMANDS, Json, Out, Overrides, TrustPython
 
 app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
-for command in (scenes, schema, check, preview, new_scene, new_recipe, import_scene, export):
+for command in (*SCENE_COMMANDS, export):
     app.command(command)
 
 benchmark = App(
@@ -174,7 +162,8 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from simgen.dataset import CERTIFICATE, certify, load_definition, make_benchmark
+    from pcii.store import CERTIFICATE
+    from simgen.dataset import certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)

@@ -4,6 +4,7 @@ Maps and images are drawn by the types of `pcii`; here is where they stand on a 
 """
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +16,9 @@ from pcii.figures import block_px, exposed, hide_frame, new_figure, to_srgb8, wh
 from pcii.store import COUNTS, Dataset, open_dataset
 from pcii.types import PhotonCounts, Truth, colours_and_samples
 from simgen.cameras import coarser
-from simgen.dataset import Prepared
+from simgen.check import load_target
 from simgen.renderer import backend, build, render_view
+from simgen.spec import Scene
 from simgen.truth import first_hits_at_centre
 
 if TYPE_CHECKING:
@@ -52,7 +54,7 @@ class Preview:
 
     def write(self, out: str | Path, dots_per_inch: float | None = None) -> None:
         """Write it as PNG or JPEG; `InputError` for another name and for a folder that is not there."""
-        check_picture_path(Path(out))
+        _check_path(Path(out))
         write_bytes_safely(Path(out), self._encode(FORMATS[Path(out).suffix.lower()], dots_per_inch))
 
     def _repr_png_(self) -> bytes:
@@ -64,7 +66,7 @@ class Preview:
         return buffer.getvalue()
 
 
-def check_picture_path(out: Path) -> None:
+def _check_path(out: Path) -> None:
     """Raise `InputError` unless a picture can be written there: before anything takes time."""
     if out.suffix.lower() not in FORMATS:
         raise InputError(f"{out}: name a .png or .jpg file")
@@ -72,10 +74,30 @@ def check_picture_path(out: Path) -> None:
         raise InputError(f"{out}: there is no folder {out.parent}; make it first")
 
 
-def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
-    """The preview of a recipe's scene. Raises `InputError` for samples below 1, and for a bad scene."""
+def preview(
+    scene: Scene | str | Path,
+    out: str | Path | None = None,
+    samples_per_pixel: int = 32,
+    scene_number: int | None = None,
+    *,
+    overrides: Sequence[str] = (),
+    trust_python: bool = False,
+) -> Preview:
+    """A picture of a scene from the virtual centre, with depth and objects, which notebooks show.
+
+    With `out` it is written too, as PNG or JPEG. The scene, or a recipe with its scene, may be given by name
+    or path, with `overrides` and `trust_python` as of `load_recipe`; of a drawn scene `scene_number` says
+    which one. It takes seconds.
+
+    Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
+
+    >>> preview(load_scene("two_objects").move("bird", by_mm=(0, -20, 0)))           # doctest: +SKIP
+    """
+    if out is not None:
+        _check_path(Path(out))
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
+    target = load_target(scene, overrides, scene_number, trust_python=trust_python)
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), PREVIEW_PX), rows=1, cols=1)
@@ -94,10 +116,13 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     figure.suptitle(title, parse_math=False)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # which would move the panels each time that the picture is written
-    return Preview(title, figure)
+    drawing = Preview(title, figure)
+    if out is not None:
+        drawing.write(out)
+    return drawing
 
 
-def part_of_interest(mask: np.ndarray) -> tuple[slice, slice]:
+def _part_of_interest(mask: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns around what is True in `mask` (H, W), with a margin and in the film's aspect; all if
     nothing is."""
     if not mask.any():
@@ -119,7 +144,7 @@ def _draw_truth(depth: "Axes", objects: "Axes", truth: Truth, whole: "Axes | Non
 
     Titles say if it is a part, which has a frame in the picture of the `whole` film, if there is one.
     """
-    rows, cols = box = part_of_interest(truth.object_id > 0)
+    rows, cols = box = _part_of_interest(truth.object_id > 0)
     Truth(truth.z_mm[box], truth.object_id[box], truth.names).plot([depth, objects])
     hide_frame(depth)
     if rows.stop - rows.start == len(truth.object_id):
@@ -138,7 +163,7 @@ def write_sheet(path: Path, out: Path) -> None:
 
     Raises `InputError` for a folder that is no finished dataset, or a picture that cannot be written.
     """
-    check_picture_path(out)
+    _check_path(out)
     Preview(path.name, draw_sheet(open_dataset(path))).write(out)
 
 
@@ -164,7 +189,7 @@ def draw_sheet(dataset: Dataset) -> "Figure":
         lines.append(f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view")
         shown = " x ".join(str(min(side, MAX_TILES)) for side in (grid.rows, grid.cols))
         panels["photons"].set_title(f"photons of {shown} views")
-        panels["photons"].imshow(photon_tiles(counts), interpolation="nearest")
+        panels["photons"].imshow(_photon_tiles(counts), interpolation="nearest")
     if truth is not None:
         _draw_truth(panels["depth"], panels["objects"], truth, whole)
     for axes in panels.values():
@@ -173,7 +198,7 @@ def draw_sheet(dataset: Dataset) -> "Figure":
     return figure
 
 
-def photon_tiles(counts: PhotonCounts) -> np.ndarray:
+def _photon_tiles(counts: PhotonCounts) -> np.ndarray:
     """Photons of at most `MAX_TILES` views in a row and column as one 8-bit picture (h, w, 3).
 
     They are shown in blocks that hold about as many photons whatever the amount of light, in their colours,

@@ -1,13 +1,20 @@
 """Commands about scenes and recipes: list, write, check, look at."""
 
+import os
+import re
+import shutil
+from collections.abc import Callable
 from dataclasses import asdict
+from json import dumps
 from pathlib import Path
+from string import Template
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base import answer_json, say, say_next
+from pcii.base import InputError, answer_json, new_folder_safely, say, say_next, write_bytes_safely
 
+TEMPLATES = Path(__file__).resolve().parent / "templates"
 Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Overrides = Annotated[
@@ -31,13 +38,32 @@ def scenes() -> None:
 
         simgen scenes
     """
-    from simgen.app.starting_points import list_recipes, list_scenes
     from simgen.base import check_installed
+    from simgen.spec import drawn_scenes, load_scene, load_sweep, recipe_names, scene_names
+
+    def title_of_recipe(name: str) -> str:
+        recipe = load_sweep(f"{name}.toml").recipe(0)
+        return recipe.title or recipe.scene
 
     check_installed()  # or else some scenes would be listed as not valid
-    for line in (*list_scenes(), "", "Recipes, of which `simgen generate` makes datasets:", *list_recipes()):
-        say(line)
+    for name in scene_names():
+        _say_title(name, lambda name: load_scene(name).title)
+    for name, package in drawn_scenes().items():
+        say(f"{name:20} Made by {package} (drawn by number)")
+    say("\nRecipes, of which `simgen generate` makes datasets:")
+    for name in recipe_names():
+        _say_title(name, title_of_recipe)
     say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")
+
+
+def _say_title(name: str, title_of: Callable[[str], str]) -> None:
+    """A name and its title, or what is wrong with its file."""
+    from simgen.base import shorten
+
+    try:
+        say(f"{name:20} {title_of(name)}")
+    except InputError as fault:
+        say(f"{name:20} not valid: {shorten(str(fault), 100)}")
 
 
 def schema(what: Literal["scene", "recipe"]) -> None:
@@ -53,10 +79,13 @@ def schema(what: Literal["scene", "recipe"]) -> None:
     what
         Which kind of file.
     """
-    from simgen.base import schema_of
     from simgen.spec import Recipe, Scene
 
-    answer_json(schema_of(Scene if what == "scene" else Recipe))
+    values = (Scene if what == "scene" else Recipe).model_json_schema()
+    for table in values["$defs"].values():  # by its `type` an editor tells which of several tables is meant
+        if "const" in table["properties"].get("type", {}):
+            table["required"] = ["type", *table.get("required", [])]
+    answer_json({"$schema": "https://json-schema.org/draft/2020-12/schema"} | values)
 
 
 def check(
@@ -134,7 +163,7 @@ def preview(
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
-    from simgen.app.library import preview
+    from simgen.app.pictures import preview
     from simgen.spec import is_scene
 
     preview(target, out, samples_per_pixel, scene, overrides=set, trust_python=trust_python)
@@ -161,9 +190,20 @@ def new_scene(name: str, *, from_: Annotated[str | None, Parameter(name="--from"
     from_
         Copy this scene, one of `simgen scenes` or the path of a folder, with its files.
     """
-    from simgen.app.starting_points import write_new_scene
+    from simgen.spec import drawn_scenes, load_scene, scene_names
 
-    say(f"{write_new_scene(name, from_)}")
+    _check_name(name)
+    folder = Path("scenes") / name
+    if folder.exists() or name in {*scene_names(), *drawn_scenes()}:
+        raise InputError(f"NAME: {name!r} is the name of a scene already; choose another")
+    files = None if from_ is None else load_scene(from_).folder
+    folder.parent.mkdir(exist_ok=True)
+    with new_folder_safely(folder) as new:
+        if files is None:
+            (new / "scene.toml").write_bytes(_filled("scene.toml", NAME=name))
+        else:
+            shutil.copytree(files, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    say(f"{folder / 'scene.toml'}")
     say_next("simgen", "check", name)
 
 
@@ -182,11 +222,36 @@ def new_recipe(name: str, *, scene: str | None = None) -> None:
     scene
         Name or path of its scene. Default: the scene of the same name, or else two_objects.
     """
-    from simgen.app.starting_points import write_new_recipe
+    from simgen.spec import is_drawn, is_scene, load_scene, recipe_file
 
-    path = write_new_recipe(name, scene)
+    _check_name(name)
+    if recipe_file(name) is not None:
+        raise InputError(f"NAME: {name!r} is the name of a recipe already; choose another")
+    path = Path("data_recipes") / f"{name}.toml"
+    scene = scene or (name if is_scene(name) else "two_objects")
+    number = 0 if is_drawn(scene) else None
+    load_scene(scene, number=number)
+    text = dumps(scene if Path(scene).name == scene else os.path.relpath(scene, path.parent))
+    if number is not None:
+        text += f"\nscene_number = {number}               # which scene of those that it draws"
+    path.parent.mkdir(exist_ok=True)
+    write_bytes_safely(path, _filled("recipe.toml", SCENE=text, NAME=name, FILE=str(path)))
     say(f"{path}")
     say_next("simgen", "check", path)
+
+
+def _filled(template: str, **words: str) -> bytes:
+    """A template with words in the place of its $NAMES."""
+    return Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(words).encode()
+
+
+def _check_name(name: str) -> None:
+    from simgen.spec import NAME
+
+    if not re.fullmatch(NAME, name):
+        raise InputError(
+            f"NAME: expected a letter, then letters, digits, _ and -, such as my-scene, not {name!r}"
+        )
 
 
 def import_scene(
@@ -241,3 +306,6 @@ def import_scene(
     for line in import_scene(file, out, **place, emission_unit=emission_unit, unscored=unscored).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")
+
+
+SCENE_COMMANDS = scenes, schema, check, preview, new_scene, new_recipe, import_scene

@@ -17,17 +17,8 @@ from pydantic import BaseModel
 
 from pcii.base import InputError, srgb_to_linear
 from pcii.exchange import UPRIGHT, decode, picture_of
-from simgen.assets.triangles import Triangles, triangulate
-from simgen.base import (
-    AssetName,
-    EnvironmentName,
-    ImageName,
-    MeshName,
-    asset,
-    named_files,
-    not_installed,
-    shorten,
-)
+from simgen.assets.triangles import Triangles, barycentric, cross_2d, fan_all
+from simgen.base import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files, shorten
 
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _FACES = ("vertex_indices", "vertex_index")
@@ -127,18 +118,19 @@ def read_environment(path: Path) -> np.ndarray:
 
 def read_mesh(path: Path) -> Triangles:
     """The mesh in a PLY or OBJ file; `InputError` that names the file if it has none that can be used."""
-    readers = {".ply": _read_ply, ".obj": _read_obj}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
+    kind = path.suffix.lower()
+    if kind not in (".ply", ".obj"):
         raise InputError(f"{path}: this file is not named .ply or .obj, the kinds of mesh that are read")
     try:
-        return reader(path)
+        return _read_ply(path) if kind == ".ply" else obj_parts(path.read_bytes(), as_one=True)[1]["", ""]
     except ValueError as fault:
         raise InputError(f"{path}: this file {shorten(str(fault))}") from None
 
 
 def ply_bytes(mesh: Triangles) -> bytes:
     """A mesh as a binary PLY file, with normals and the texture coordinates s, t where it has them."""
+    from plyfile import PlyData, PlyElement
+
     columns = {"x y z": mesh.positions, "nx ny nz": mesh.normals, "s t": mesh.texcoords}
     present = {names: values for names, values in columns.items() if values is not None}
     layout = np.dtype([(name, "<f4") for name in " ".join(present).split()])
@@ -146,9 +138,8 @@ def ply_bytes(mesh: Triangles) -> bytes:
     faces = np.empty(len(mesh.faces), [("vertex_indices", "<i4", (3,))])
     faces["vertex_indices"] = mesh.faces
     file = io.BytesIO()
-    ply = _plyfile()
-    elements = [ply.PlyElement.describe(vertices, "vertex"), ply.PlyElement.describe(faces, "face")]
-    ply.PlyData(elements, byte_order="<").write(file)
+    elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
+    PlyData(elements, byte_order="<").write(file)
     return file.getvalue()
 
 
@@ -182,32 +173,20 @@ def _read_ply(path: Path) -> Triangles:
     texcoords = next((pair for names in _TEXCOORDS if (pair := columns(*names)) is not None), None)
     if corners.dtype.kind not in "iu":
         raise ValueError("has a face whose vertex is not a whole number")
-    triangles = triangulate(corners.astype(np.int64), counts, positions)
+    triangles = _triangulate(corners.astype(np.int64), counts, positions)
     return Triangles.checked(positions, triangles, columns("nx", "ny", "nz"), texcoords)
-
-
-def _plyfile() -> Any:
-    try:
-        import plyfile
-    except ModuleNotFoundError:
-        raise not_installed(["plyfile"]) from None
-    return plyfile
 
 
 def _parsed_ply(path: Path) -> Any:
     """Faces are read all at once if they are triangles, as most are: from the file, which is mapped."""
-    ply = _plyfile()
+    from plyfile import PlyData, PlyElementParseError
+
     header = path.read_bytes().partition(b"end_header")[0]
     name = next((name for name in _FACES if name.encode() in header), _FACES[0])
     if b"format ascii" not in header:
-        with contextlib.suppress(ply.PlyElementParseError):  # other polygons, or a broken file
-            return ply.PlyData.read(str(path), known_list_len={"face": {name: 3}})
-    return ply.PlyData.read(str(path))
-
-
-def _read_obj(path: Path) -> Triangles:
-    """All that is in an OBJ file as one mesh; raises `ValueError` as `obj_parts` does."""
-    return obj_parts(path.read_bytes(), as_one=True)[1]["", ""]
+        with contextlib.suppress(PlyElementParseError):  # other polygons, or a broken file
+            return PlyData.read(str(path), known_list_len={"face": {name: 3}})
+    return PlyData.read(str(path))
 
 
 def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tuple[str, str], Triangles]]:
@@ -270,7 +249,7 @@ def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray)
         for one, numbers in zip(values, triples[first].T, strict=True)
     )
     assert positions is not None
-    return Triangles.checked(positions, triangulate(vertices.ravel(), counts, positions), normals, uv)
+    return Triangles.checked(positions, _triangulate(vertices.ravel(), counts, positions), normals, uv)
 
 
 def _corner(word: str, sizes: list[int]) -> list[int]:
@@ -280,3 +259,42 @@ def _corner(word: str, sizes: list[int]) -> list[int]:
     if not numbers[0] or any(abs(number) > size for number, size in zip(numbers, sizes, strict=True)):
         raise ValueError
     return [n - 1 if n >= 0 else size + n for n, size in zip(numbers, sizes, strict=True)]
+
+
+def _triangulate(corners: np.ndarray, counts: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Triangles as of `fan_all`, also of polygons that are not convex, of vertices at `positions` (V, 3)."""
+    triangles = fan_all(corners, counts)
+    if (counts == 3).all() or corners.min(initial=0) < 0 or corners.max(initial=0) >= len(positions):
+        return triangles  # vertices that do not exist are refused with the mesh
+    a, b, c = np.moveaxis(positions[triangles], 1, 0)
+    normals, owner = np.cross(b - a, c - a), np.repeat(np.arange(len(counts)), counts - 2)
+    whole = np.zeros((len(counts), 3))
+    np.add.at(whole, owner, normals)
+    is_turned = np.einsum("ij,ij->i", normals, whole[owner]) < 0
+    first, begin = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
+    for polygon in np.unique(owner[is_turned]):
+        vertices = corners[first[polygon] : first[polygon] + counts[polygon]]
+        ears = _cut_ears(positions[vertices], whole[polygon])
+        triangles[begin[polygon] : begin[polygon] + len(ears)] = vertices[ears]
+    return triangles
+
+
+def _cut_ears(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Triangles (N - 2, 3) of a polygon (N, 3) in a plane, cut off one after another (Meisters 1975)."""
+    axis = int(np.abs(normal).argmax())
+    flat = np.delete(points, axis, axis=1)
+    if (normal[axis] < 0) != (axis == 1):  # so that it runs the positive way round
+        flat = flat[:, ::-1]
+    left, ears = list(range(len(points))), list[list[int]]()
+    while len(left) > 3:
+        trio = left[:3]  # edges that cross each other leave no ear: any three will do
+        for place in range(len(left)):
+            trio = [left[place - 1], left[place], left[(place + 1) % len(left)]]
+            a, b, c = flat[trio]
+            others = [number for number in left if number not in trio]
+            is_within = (barycentric(flat[others], np.array([[a, b, c]])) > 0).all(axis=1)
+            if cross_2d(b - a, c - b) > 0 and not is_within.any():
+                break
+        ears.append(trio)
+        left.remove(trio[1])
+    return np.array([*ears, left])

@@ -111,45 +111,6 @@ def fan_all(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return corners[np.stack([first, first + number + 1, first + number + 2], axis=-1)]
 
 
-def triangulate(corners: np.ndarray, counts: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Triangles as of `fan_all`, also of polygons that are not convex, of vertices at `positions` (V, 3)."""
-    triangles = fan_all(corners, counts)
-    if (counts == 3).all() or corners.min(initial=0) < 0 or corners.max(initial=0) >= len(positions):
-        return triangles  # vertices that do not exist are refused with the mesh
-    a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    normals, owner = np.cross(b - a, c - a), np.repeat(np.arange(len(counts)), counts - 2)
-    whole = np.zeros((len(counts), 3))
-    np.add.at(whole, owner, normals)
-    is_turned = np.einsum("ij,ij->i", normals, whole[owner]) < 0
-    first, begin = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
-    for polygon in np.unique(owner[is_turned]):
-        vertices = corners[first[polygon] : first[polygon] + counts[polygon]]
-        ears = _cut_ears(positions[vertices], whole[polygon])
-        triangles[begin[polygon] : begin[polygon] + len(ears)] = vertices[ears]
-    return triangles
-
-
-def _cut_ears(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Triangles (N - 2, 3) of a polygon (N, 3) in a plane, cut off one after another (Meisters 1975)."""
-    axis = int(np.abs(normal).argmax())
-    flat = np.delete(points, axis, axis=1)
-    if (normal[axis] < 0) != (axis == 1):  # so that it runs the positive way round
-        flat = flat[:, ::-1]
-    left, ears = list(range(len(points))), list[list[int]]()
-    while len(left) > 3:
-        trio = left[:3]  # edges that cross each other leave no ear: any three will do
-        for place in range(len(left)):
-            trio = [left[place - 1], left[place], left[(place + 1) % len(left)]]
-            a, b, c = flat[trio]
-            others = [number for number in left if number not in trio]
-            is_within = (barycentric(flat[others], np.array([[a, b, c]])) > 0).all(axis=1)
-            if cross_2d(b - a, c - b) > 0 and not is_within.any():
-                break
-        ears.append(trio)
-        left.remove(trio[1])
-    return np.array([*ears, left])
-
-
 def cross_2d(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Cross product of vectors (..., 2) in a plane: twice the area of the triangle between them, signed."""
     return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]

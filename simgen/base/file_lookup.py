@@ -1,8 +1,9 @@
-"""Where files are: scenes and recipes by name, what a scene brings along in its folder, and values that are
-cached between processes."""
+"""What is on this machine: scenes and recipes by name, what a scene brings along in its folder, values that
+are cached between processes, packages that rendering needs."""
 
 import contextlib
 import hashlib
+import importlib.util
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -18,21 +19,23 @@ LONGEST_NAME = 200
 LARGEST_FILE_BYTES = 1 << 28
 _PACKAGE = Path(__file__).resolve().parents[1]
 Value = TypeVar("Value")
-
-
-def roots() -> list[Path]:
-    """Where scenes and recipes may be: in the working directory, the source tree, the installed package."""
-    return list(dict.fromkeys((Path.cwd(), _PACKAGE.parent, _PACKAGE / "_shipped")))
+RENDERING_MODULES = {"mitsuba": "mitsuba", "drjit": "drjit", "colour": "colour-science", "plyfile": "plyfile"}
+"""The modules of the extra `render`, and the packages that they are of."""
 
 
 def find(name: str) -> Path | None:
     """The first file of that name, such as "scenes/desk/scene.toml", under any of the roots."""
-    return next((root / name for root in roots() if (root / name).is_file()), None)
+    return next((root / name for root in _roots() if (root / name).is_file()), None)
 
 
 def find_all(pattern: str) -> list[Path]:
     """All files of that pattern, such as "data_recipes/*.toml", under all roots."""
-    return [file for root in roots() for file in sorted(root.glob(pattern))]
+    return [file for root in _roots() for file in sorted(root.glob(pattern))]
+
+
+def _roots() -> list[Path]:
+    """Where scenes and recipes may be: in the working directory, the source tree, the installed package."""
+    return list(dict.fromkeys((Path.cwd(), _PACKAGE.parent, _PACKAGE / "_shipped")))
 
 
 class AssetName(str):
@@ -110,3 +113,18 @@ def cached(
     with contextlib.suppress(OSError):
         write_json_safely(path, values)
     return read(values)
+
+
+def check_installed() -> None:
+    """Raise `InputError` unless all packages that rendering needs are installed."""
+    missing = [name for module, name in RENDERING_MODULES.items() if importlib.util.find_spec(module) is None]
+    if missing:
+        raise not_installed(missing)
+
+
+def not_installed(names: Sequence[str]) -> InputError:
+    """That packages are missing, and what to type."""
+    return InputError(
+        f"{' and '.join(names)}: not installed, and needed for rendering; type in the source tree:  "
+        "pip install '.[render]'"
+    )

@@ -1,14 +1,17 @@
 """What scene and recipe files share: strict models, how they are read and written as TOML, and faults that
 name the field."""
 
+import ast
 import difflib
+import inspect
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
@@ -21,10 +24,26 @@ MOST_FAULTS = 20
 """Largest number of faults that one error lists."""
 
 
+def _describe_fields(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Put the texts below the fields of a class into its JSON Schema.
+
+    Pydantic's `use_attribute_docstrings` reads them when a class is made, which is slow and seldom needed.
+    """
+    for base in model.__mro__:
+        if issubclass(base, Strict):
+            (tree,) = ast.parse(inspect.getsource(base)).body
+            for pair in pairwise(tree.body if isinstance(tree, ast.ClassDef) else ()):
+                match pair:
+                    case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
+                        schema["properties"][name].setdefault("description", inspect.cleandoc(text))
+
+
 class Strict(BaseModel):
     """Frozen; an unknown key, NaN or infinity is an error: `InputError`, for whoever makes one in Python."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=_describe_fields
+    )
 
     def __init__(self, /, **values: Any) -> None:
         with _as_input_errors(type(self).__name__, values):
@@ -86,24 +105,6 @@ def _one_line(title: str) -> str:
 
 
 Title = Annotated[str, Field(max_length=200), AfterValidator(_one_line)]
-
-
-def completed_by(key: Literal["enum", "examples"], names: Callable[[], list[str]]) -> Callable[[Any], None]:
-    """Puts names into a field's JSON Schema, where editors find them; they are looked up only then."""
-
-    def add(schema: dict[str, Any]) -> None:
-        schema[key] = names()
-
-    return add
-
-
-def schema_of(model: type[BaseModel]) -> dict[str, Any]:
-    """The JSON Schema of a model's files; by its `type` an editor tells which of several tables is meant."""
-    schema = model.model_json_schema()
-    for table in schema.get("$defs", {}).values():
-        if "const" in table.get("properties", {}).get("type", {}):
-            table["required"] = ["type", *table.get("required", [])]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -1,12 +1,12 @@
 from . import dataset_collection as dataset_collection, generation as generation
-from .benchmark_making import CERTIFICATE as CERTIFICATE, Definition as Definition, certify as certify
-from .benchmark_making import load_definition as load_definition, make_benchmark as make_benchmark
+from .benchmark_making import certify as certify, Definition as Definition, load_definition as load_definition
+from .benchmark_making import make_benchmark as make_benchmark
 from .dataset_collection import generate_collection as generate_collection
 from .generation import generate as generate
-from .photon_counts import draw_from_views as draw_from_views, write_counts as write_counts
-from .prepared import Prepared as Prepared, capture_of as capture_of, prepare as prepare
-from .prepared import prepare_scene as prepare_scene
-from .rendered_views import exact_view as exact_view, halved_view as halved_view
+from .prepared import capture_of as capture_of, prepare as prepare, prepare_scene as prepare_scene
+from .prepared import Prepared as Prepared
+from .rendered_views import draw_from_views as draw_from_views, exact_view as exact_view
+from .rendered_views import halved_view as halved_view, write_counts as write_counts
 from .resources import available_bytes as available_bytes, check_resources as check_resources
 from .resources import in_bytes as in_bytes, peak_bytes as peak_bytes, product_bytes as product_bytes
 from .resources import shortage as shortage

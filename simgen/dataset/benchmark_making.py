@@ -15,43 +15,64 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent, write_json_safely
 from pcii.store import (
     BENCHMARK_FIELDS,
     CERTIFICATE,
+    CROISSANT,
     IN_FRAMES,
+    INDEX,
+    MANIFEST,
+    RADIANCE,
     Dataset,
     Half,
+    Terms,
+    hash_file,
     hash_json,
     open_collection,
     read_index,
     write_card,
     write_licence,
 )
-from simgen.base import find_all, read_toml, suggestion, validate
-from simgen.dataset.croissant_file import write_croissant
+from simgen.base import Positive, Strict, find_all, read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection
-from simgen.dataset.dataset_folder import versions
+from simgen.dataset.prepared import versions
 from simgen.renderer import backend
 from simgen.spec import Publication, Recipe, load_recipe
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
-Photons = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 TILE_PX = 64
 MIN_P = 1e-4
 """The share of benchmarks of the same light that are taken for other ones, by any of their datasets."""
 Content = Mapping[str, Any]
 """Of a dataset: a hash of its files, and its photons in each view and each tile."""
+CROISSANT_CONTEXT: dict[str, Any] = {
+    "@language": "en",
+    "@vocab": "https://schema.org/",
+    "sc": "https://schema.org/",
+    "cr": "http://mlcommons.org/croissant/",
+    "dct": "http://purl.org/dc/terms/",
+    "conformsTo": "dct:conformsTo",
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    **{
+        term: f"cr:{term}"
+        for term in ["citeAs", "extract", "field", "fileSet", "includes", "jsonPath", "recordSet", "source"]
+    },
+}
+"""Of the context that Croissant prescribes what is used here."""
+CROISSANT_FIELDS = {
+    "title": ("sc:Text", "$.title"),
+    "scene": ("sc:Text", "$.recipe.scene"),
+    "seed": ("sc:Integer", "$.recipe.seed"),
+    "identity": ("sc:Text", "$.identity"),
+}
+"""Of a Croissant record: type, and where a manifest has it."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Scene(_Model):
+class Scene(Strict):
     """A scene of the benchmark: a recipe, which gives it cameras and depths too, and what it is for."""
 
     name: Name
@@ -70,14 +91,14 @@ class Scene(_Model):
     """Whether its first draw has the brighter light too."""
 
 
-class Definition(_Model):
+class Definition(Strict):
     """All that decides what is in a benchmark."""
 
     name: Name
     title: str
-    photons_per_view: tuple[Photons, ...]
+    photons_per_view: tuple[Positive, ...]
     """From the least light to the most; all photons of less light are among those of more."""
-    brighter_photons_per_view: tuple[Photons, ...] = ()
+    brighter_photons_per_view: tuple[Positive, ...] = ()
     """More light, of the first seed: images differ little from draw to draw, and take most of the time."""
     seeds: tuple[Annotated[int, Field(ge=0)], ...]
     """Draws of the photons of each scene."""
@@ -123,14 +144,9 @@ class Verdict:
         )
 
 
-def benchmark_files() -> dict[str, Path]:
-    """Files of the benchmarks that ship, by name."""
-    return {file.stem: file for file in find_all("data_recipes/benchmarks/*.toml")}
-
-
 def load_definition(name_or_path: str) -> tuple[Definition, Path]:
     """A benchmark by name or path of its file, and that file; `InputError` if it is missing or wrong."""
-    files = benchmark_files()
+    files = {file.stem: file for file in find_all("data_recipes/benchmarks/*.toml")}
     file = files.get(name_or_path, Path(name_or_path))
     if not file.is_file():
         raise InputError(f"benchmark: there is no {name_or_path!r}{suggestion(name_or_path, list(files))}")
@@ -224,19 +240,63 @@ def make_benchmark(
         raise InputError(f"scene: none of these scenes is in the {half} half")
     series = BenchmarkSeries(definition, file.parent.parent, scenes)
     faults = generate_collection(series, out, executor, report)
-    _write_terms(series, out)
-    return faults
-
-
-def _write_terms(series: BenchmarkSeries, out: Path) -> None:
-    """Write README.md and LICENSE of the collection and of its datasets, which may be passed on alone."""
-    definition = series.definition
     terms = definition.publication.terms()
+    # Of the datasets too, which may be passed on alone.
     for folder in (out, *(out / row["path"] for row in read_index(out))):
         write_card(folder, terms)
         if terms.licence:
             write_licence(folder, terms)
-    write_croissant(out, definition.name, definition.title, terms)
+    write_json_safely(out / CROISSANT, _croissant(definition, terms, hash_file(out / INDEX)))
+    return faults
+
+
+def _croissant(definition: Definition, terms: Terms, index_sha256: str) -> dict[str, Any]:
+    """Croissant metadata of the collection (mlcommons.org/croissant, 1.0), which catalogues of datasets read.
+
+    Records are the datasets, as their manifests describe them; their arrays are Zarr, which Croissant has no
+    way to read. What the terms leave open is left out.
+    """
+
+    def node(kind: str, name: str, **members: Any) -> dict[str, Any]:
+        return {"@type": kind, "@id": name, "name": name, **members}
+
+    file_sets = {
+        "manifests": (f"*/{MANIFEST}", "application/json"),
+        "arrays": ("*/*.zarr/**", "application/vnd.zarr"),
+        "radiance": (f"*/{RADIANCE}/*.exr", "image/x-exr"),
+    }
+    stated = {
+        "license": terms.licence and terms.address,
+        "url": terms.url,
+        "citeAs": terms.citation,
+        "creator": [{"@type": "sc:Organization", "name": creator} for creator in terms.creators],
+    }
+    fields = [
+        node(
+            "cr:Field",
+            f"datasets/{field}",
+            dataType=kind,
+            source={"fileSet": {"@id": "manifests"}, "extract": {"jsonPath": place}},
+        )
+        for field, (kind, place) in CROISSANT_FIELDS.items()
+    ]
+    index = {"contentUrl": INDEX, "encodingFormat": "application/jsonlines", "sha256": index_sha256}
+    return {
+        "@context": CROISSANT_CONTEXT,
+        "@type": "sc:Dataset",
+        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "name": definition.name,
+        "description": definition.title,
+        **{key: value for key, value in stated.items() if value},
+        "distribution": [
+            node("cr:FileObject", "index", **index),
+            *(
+                node("cr:FileSet", key, includes=pattern, encodingFormat=kind)
+                for key, (pattern, kind) in file_sets.items()
+            ),
+        ],
+        "recordSet": [node("cr:RecordSet", "datasets", field=fields)],
+    }
 
 
 def published_certificate(file: Path) -> dict[str, Any]:

@@ -25,12 +25,12 @@ from pcii.store import (
     MARKER,
     check_manifest,
     index_row,
+    provenance,
     read_index,
     write_index,
 )
-from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_dataset, other_versions
-from simgen.dataset.generation import Reuse, make
-from simgen.dataset.prepared import prepare
+from simgen.dataset.generation import Reuse, find_finished, make
+from simgen.dataset.prepared import DECISIVE, other_dataset, other_versions, prepare
 from simgen.renderer import backend
 from simgen.spec import Recipe
 
@@ -93,7 +93,7 @@ class DatasetJob:
 
     def __init__(self, series: Series, out: Path, report: Report = silent) -> None:
         self.series, self.out, self.report, self.reuse = series, out, report, Reuse()
-        self.versions = decisive_versions()
+        self.versions = provenance.versions(*DECISIVE)
 
     def __call__(self, piece: int) -> Row | str:
         """Make one dataset, unless it is finished; its row of the index, or why it cannot be made.
@@ -136,7 +136,7 @@ def _begin(series: Series, out: Path) -> None:
     document = {
         "fields": list(series.fields),
         "recipe": {name: value for name, value in series.base.items() if name != "publication"},
-        "versions": decisive_versions(),
+        "versions": provenance.versions(*DECISIVE),
     }
     if not any(entry.is_dir() for entry in os.scandir(out)):
         COLLECTION_FOLDER.write(out, document)

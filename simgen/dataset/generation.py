@@ -1,32 +1,49 @@
-"""From a recipe to a dataset folder: the order of the work, and what datasets have in common."""
+"""From a recipe to a dataset folder: whose it is, the order of the work, and what datasets have in common."""
 
+import json
 import math
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pcii.base import Report, named_in_errors, new_folder_safely, silent, sweep_temporaries
+from pcii.base import (
+    InputError,
+    Report,
+    locked,
+    named_in_errors,
+    new_folder_safely,
+    silent,
+    sweep_temporaries,
+)
 from pcii.store import (
     ARRAYS,
     COUNTS,
     DATASET_FOLDER,
     MANIFEST,
+    MARKER,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
     DatasetManifest,
+    check_size,
     list_files,
     nested_name,
     pack_arrays,
+    read_listed,
 )
-from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
-from simgen.dataset.photon_counts import draw_from_views, write_counts
-from simgen.dataset.prepared import Prepared, prepare
-from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
+from simgen.dataset.prepared import DECISIVE, Prepared, other_dataset, prepare, versions
+from simgen.dataset.rendered_views import (
+    RENDERED,
+    RenderedViews,
+    background_paths_saved,
+    draw_from_views,
+    write_counts,
+)
 from simgen.dataset.resources import check_resources
 from simgen.photons import Capture, Plan, thin_photons
 from simgen.renderer import RenderScene, backend
@@ -103,10 +120,10 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> Dataset
     """
     recipe, identity, timings_s = prepared.recipe, prepared.identity, dict[str, float]()
     engine, counting = backend.describe(spectral=recipe.is_spectral), None
-    with named_in_errors(out), claim(out, identity, engine) as marker:
+    with named_in_errors(out), _claim(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
-            return read_whole(out, identity, content=True)
+            return _read_whole(out, identity, content=True)
         check_resources(recipe, None, out, prepared.map_counts)
         with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
             capture = prepared.capture(reuse.once("scene", prepared.scene_key, prepared.render_scene))
@@ -172,7 +189,7 @@ def _write_products(
             views.render(report)
     if dense is not None:
         with _timed(timings_s, "counts"):
-            photons = write(*draw_from_views(capture, views.mosaic, views.variance, dense, report))
+            photons = write(*draw_from_views(capture, views.view, dense, report))
     return photons
 
 
@@ -233,3 +250,74 @@ def _skipped(
     if not products.view_truth:
         add("truth of every view", "the recipe does not ask for it", pixels, "first hits")
     return entries
+
+
+def find_finished(out: Path, identity: str, *, content: bool = True) -> DatasetManifest | None:
+    """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
+
+    Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
+    folder that holds anything else.
+    """
+    # In this order, since another run may finish it meanwhile: the manifest is there before the mark is gone.
+    if DATASET_FOLDER.guard(out) <= {MARKER} or (out / MARKER).is_file():
+        return None
+    return _read_whole(out, identity, content=content)
+
+
+def _read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
+    """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
+    manifest = DATASET_FOLDER.read(out)
+    if manifest.identity != identity:
+        raise other_dataset(out, "dataset", manifest.versions)
+    check = read_listed if content else check_size
+    for name, entry in manifest.files.items():
+        check(out, name, entry)
+    return manifest
+
+
+@contextmanager
+def _claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
+    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark.
+
+    If nothing was put into the folder before the block raises, the mark is removed, and what folders were
+    made for it. Raises `InputError` at once if another process is making the dataset.
+    """
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    marker = out / MARKER
+    with locked(marker, out) as file:
+        text = file.read()
+        if text:
+            _check_mark(marker, text, identity, engine)
+        else:
+            mark = {"identity": identity, "versions": versions(), "backend": engine}
+            file.write(json.dumps(mark).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        try:
+            yield marker
+        except BaseException:
+            with suppress(OSError):
+                if [entry.name for entry in out.iterdir()] == [MARKER]:
+                    marker.unlink()
+                    for folder in new:
+                        folder.rmdir()
+            raise
+
+
+def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
+    """Raise `InputError` unless the mark is of the same recipe on the same backend."""
+    decisive = ("variant", "mitsuba", "drjit")
+    out = marker.parent
+    try:
+        mark = json.loads(text)
+        known, before = mark["identity"], {key: mark["backend"][key] for key in decisive}
+        recorded = {name: mark["versions"][name] for name in DECISIVE}
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{marker}: damaged; delete the folder {out} to start again") from None
+    if known != identity:
+        raise other_dataset(out, "unfinished dataset", recorded)
+    if before != {key: engine[key] for key in decisive}:
+        raise InputError(
+            f"{out}: was begun with {before['variant']}, and this machine now runs {engine['variant']}, "
+            f"whose pixels differ; delete the folder {out} to start again, or set SIMGEN_BACKEND"
+        )

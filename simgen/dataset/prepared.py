@@ -1,5 +1,6 @@
 """A recipe with all that it names, and what each stage of the work takes of it."""
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,18 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from pcii.store import DATASET_FOLDER, hash_file, hash_json
+from pcii.base import InputError
+from pcii.store import DATASET_FOLDER, PACKAGE, hash_file, hash_json, provenance
 from simgen.assets import read_assets
 from simgen.base import asset
 from simgen.base import random_streams as seeds
 from simgen.cameras import rig_of
-from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import available_bytes, shortage
 from simgen.photons import Capture, Plan, plan_counts
 from simgen.renderer import RenderScene, backend, build
 from simgen.sensor import dark_map, photons_per_radiance, sensitivities
 from simgen.spec import Analysis, Recipe, Scene, checked_folder, load_scene, scene_files
 
+DECISIVE = (PACKAGE, "mitsuba")
+"""Packages whose versions are part of what identifies a dataset, with its recipe and scene."""
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""
 
@@ -82,7 +85,7 @@ class Prepared:
         content = self.scene_content | {
             "recipe": self.recipe_of_data,
             "format_version": DATASET_FOLDER.version,
-            "software": decisive_versions(),
+            "software": provenance.versions(*DECISIVE),
         }
         return hash_json(content)
 
@@ -172,3 +175,26 @@ def capture_of(
 def least_samples(recipe: Recipe) -> int:
     """Samples per pixel of the radiance images that a recipe asks for; 1 if it asks for none."""
     return 1 if recipe.products.radiance == "none" else recipe.render.samples_per_pixel
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that make datasets."""
+    return provenance.versions(*DECISIVE, "drjit", "numpy", "zarr")
+
+
+def other_versions(recorded: Mapping[str, str]) -> str:
+    """How the decisive versions recorded differ from those here, in words; empty if they are the same."""
+    known = {name: number for name, number in recorded.items() if name in DECISIVE}
+    return provenance.differences(known, provenance.versions(*DECISIVE))
+
+
+def other_dataset(out: Path, what: str, recorded: Mapping[str, str]) -> InputError:
+    """That a folder holds something of other software or, if its versions agree, of another recipe."""
+    differences = other_versions(recorded)
+    if not differences:
+        text = f"{out}: holds the {what} of another recipe or scene, or of other files that they name"
+        return InputError(f"{text}; name a new or empty folder")
+    return InputError(
+        f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a new or "
+        "empty folder, or install that software"
+    )

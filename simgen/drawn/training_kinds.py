@@ -11,10 +11,9 @@ from functools import partial
 from itertools import accumulate
 from random import Random
 
-from simgen.drawn import composition as draw
-from simgen.drawn import curved_shapes as curved
+from simgen.drawn import kinds as draw
 from simgen.drawn import training_parts as parts
-from simgen.drawn.composition import UPRIGHT, Objects, Triple
+from simgen.drawn.kinds import UPRIGHT, Objects, Table, Triple
 from simgen.spec import Scene
 
 TOTAL_PX_MM = 9 * 5 * 50 / 0.0704
@@ -100,7 +99,7 @@ def furnished(random: Random) -> Scene:
     floor = draw.log_uniform(random, 60, 160)
     objects = Objects()
     parts.add_room(random, objects, wall, floor)
-    parts.add_pictures(random, objects, wall, floor)
+    _add_pictures(random, objects, wall, floor)
     for number in range(random.randint(len(planes), 2 * len(planes) + 1)):
         z = planes[number % len(planes)]
         shape, behind, half_height = parts.any_shape(random, draw.log_uniform(random, 12, 60))
@@ -132,7 +131,7 @@ def heap(random: Random) -> Scene:
         z = random.choice(planes) + behind + random.gauss(0, depth_spread)
         place = random.gauss(0, spread), random.gauss(0, 0.8 * spread), z
         turned = random.uniform(-turn, turn), random.uniform(-turn, turn), random.uniform(-180, 180)
-        material = parts.nearly_alike(random, random.choice(materials))
+        material = _nearly_alike(random, random.choice(materials))
         objects.add(f"{kind}-{number}", place, turned, shape, material)
     parts.add_backwall(random, objects, planes[-1])
     return _in_any_light(random, "A heap", objects, planes)
@@ -142,7 +141,7 @@ def pickets(random: Random) -> Scene:
     """Pickets, rods, a grid or wires, 3 to 25 px wide, before one to three things or a wall."""
     near, *others = plane_depths(random, random.choice([2, 2, 3]))
     objects = Objects()
-    parts.add_narrow_things(random, objects, near)
+    _add_narrow_things(random, objects, near)
     material = random.choice([draw.plain, parts.any_material])
     if random.random() < 0.3:
         parts.add_wall(random, objects, others[-1], material, side_mm=1000)
@@ -222,15 +221,15 @@ def meshes(random: Random) -> Scene:
     planes = plane_depths(random, random.choice([2, 2, 3, 4]))
     objects = Objects()
     for number in range(random.randint(2, 6)):
-        make = random.choice([curved.blob, curved.head, curved.tube, curved.tube, curved.spindle])
+        make = random.choice(parts.CURVED)
         size = draw.log_uniform(random, 18, 85)
-        z = planes[number % len(planes)] + (0.0 if make is curved.tube else 0.6 * size)
-        place = random.uniform(-100, 100), random.uniform(-80, 80), z
-        turn = 40.0 if make is curved.head else random.choice([25.0, 180.0])
+        kind, z = make.__name__, planes[number % len(planes)]
+        behind = 0.0 if kind == "tube" else 0.6 * size
+        place = random.uniform(-100, 100), random.uniform(-80, 80), z + behind
+        turn = 40.0 if kind == "head" else random.choice([25.0, 180.0])
         rotation = random.uniform(-turn, turn) / 2, random.uniform(-turn, turn), random.uniform(-turn, turn)
         material = random.choice([draw.plain, parts.any_material, parts.any_material, draw.glossy])(random)
-        name, shape = f"{make.__name__}-{number}", curved.mesh_of(make(random), size)
-        objects.add(name, place, rotation, shape, material)
+        objects.add(f"{kind}-{number}", place, rotation, parts.mesh_of(make(random), size), material)
     parts.add_backwall(random, objects, planes[-1])
     return _in_any_light(random, "Curved things", objects, planes)
 
@@ -244,6 +243,58 @@ def empty_wall(random: Random) -> Scene:
     objects.add("wall", (0.0, 0.0, wall), turned, draw.card(1200, 1200), material)
     away = [plane for plane in range(440, 761) if abs(TOTAL_PX_MM / plane - TOTAL_PX_MM / wall) > 13]
     return _in_any_light(random, "An empty wall", objects, [random.choice(away)])
+
+
+def _add_pictures(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
+    """Add up to four pictures on the back wall, some of them in a frame, some of a few patches."""
+    for number in range(random.choice([0, 1, 1, 2, 3, 4])):
+        width, height = draw.log_uniform(random, 30, 250), draw.log_uniform(random, 30, 180)
+        reach = parts.HALF_FIELD * wall_mm
+        x, y = random.uniform(-0.8, 0.8) * reach, random.uniform(-0.8 * reach, min(floor_mm, reach) - 20)
+        turned = 0.0, 0.0, random.choice([0.0, random.uniform(-8, 8)])
+        if random.random() < 0.5:
+            frame = draw.box_of(1.12 * width, 1.12 * height, 3)
+            objects.add(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, draw.plain(random))
+        place, shape = (x, y, wall_mm - 3.3), draw.card(width, height)
+        objects.add(f"picture-{number}", place, turned, shape, parts.any_material(random))
+        for patch in range(random.choice([0, 0, 3])):
+            place = x + random.uniform(-0.3, 0.3) * width, y + random.uniform(-0.3, 0.3) * height
+            shape = draw.card(random.uniform(0.1, 0.4) * width, random.uniform(0.1, 0.4) * height)
+            name, z = f"picture-{number}-{patch}", wall_mm - 3.6 - 0.3 * patch
+            objects.add(name, (*place, z), turned, shape, parts.any_material(random, 128))
+
+
+def _add_narrow_things(random: Random, objects: Objects, z_mm: float) -> None:
+    """Add pickets, rods or wires beside each other, of one material, or two layers of them that cross."""
+    width = draw.log_uniform(random, 2.4, 20)
+    shape_of = random.choice(
+        [
+            lambda long: draw.card(width, long),
+            lambda long: draw.box_of(width, long, draw.log_uniform(random, 1, 12)),
+            lambda long: parts.mesh_of(parts.rod(), width / 2, long / 2, width / 2),
+        ]
+    )
+    spacing, tilt = width * draw.log_uniform(random, 1.5, 6), random.uniform(-90, 90)
+    count, disorder = max(3, min(24, round(320 / spacing))), random.choice([0.0, 1.0, 12.0])
+    material = draw.plain(random) if random.choice([True, False]) else parts.any_material(random, 256)
+    for layer in range(random.choice([1, 1, 2])):
+        long = random.uniform(100, 400)
+        for number in range(count):
+            angle = tilt + 90 * layer
+            along = spacing * (number - (count - 1) / 2) + random.gauss(0, spacing * disorder / 30)
+            across = random.gauss(0, 0.04) * long
+            cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+            place = along * cosine - across * sine, along * sine + across * cosine, z_mm + 2.0 * layer
+            turned = 0.0, 0.0, angle + random.gauss(0, disorder)
+            objects.add(f"narrow-{layer}-{number}", place, turned, shape_of(long), material)
+
+
+def _nearly_alike(random: Random, material: Table) -> Table:
+    """The same material; of one colour a little lighter or darker."""
+    light = random.uniform(0.9, 1.1)
+    if "reflectance" not in material:
+        return material
+    return material | {"reflectance": [round(min(1.0, light * part), 3) for part in material["reflectance"]]}
 
 
 def plane_depths(random: Random, count: int, nearest_gap_px: float = GAP_PX[0]) -> list[int]:
@@ -264,13 +315,58 @@ def _under_a_lamp(
     x, z = round(random.uniform(-300, 300)), round(random.uniform(100, 400))
     lamp, around = (round(value, 1) for value in luminances_cd_m2)
     lights = [draw.lamp_above(x, z, lamp), draw.sky(around)]
-    backdrop = parts.any_backdrop(random, draw.colour(random, 0.1, 0.6))
+    backdrop = _any_backdrop(random, draw.colour(random, 0.1, 0.6))
     return draw.composed(title, objects, planes_mm, lights, backdrop)
 
 
 def _in_any_light(random: Random, title: str, objects: Objects, planes_mm: list[int]) -> Scene:
     finishes = {thing["material"]["finish"]["type"] for thing in objects if "finish" in thing["material"]}
     bright = draw.colour(random, 0.1, 0.6)
-    lights = parts.any_lights(random, finishes)
-    backdrop = parts.any_backdrop(random, bright)
-    return draw.composed(title, objects, planes_mm, lights, backdrop, curved.mesh_folder())
+    lights = _any_lights(random, finishes)
+    backdrop = _any_backdrop(random, bright)
+    return draw.composed(title, objects, planes_mm, lights, backdrop, parts.mesh_folder())
+
+
+def _any_backdrop(random: Random, bright: list[float]) -> Table:
+    """Black, dark, or of this colour."""
+    (reflectance,) = random.choices([[0.02, 0.02, 0.02], [0.04, 0.04, 0.05], bright], weights=[2, 2, 1])
+    return {"z_mm": 2500.0, "reflectance": reflectance}
+
+
+def _any_lights(random: Random, finishes: set[str]) -> list[Table]:
+    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
+
+    Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
+    So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
+    """
+    even_light = draw.sky(round(draw.log_uniform(random, 20, 400), 1))
+    kinds = ["area", "area", "none"]
+    if "glass" in finishes:
+        kinds = ["none"]
+    elif not finishes:
+        kinds += ["point", "spot", "directional"]
+    kind = random.choice(kinds)
+    place, target = (
+        [round(random.uniform(*ends)) for ends in box]
+        for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
+    )
+    lux, square_m = draw.log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
+    side, beam = draw.log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
+    if kind == "none":
+        return [even_light]
+    luminance = lux * square_m / (side * side / 1e6)
+    values = {
+        "area": {"width_mm": side, "height_mm": side, "luminance_cd_m2": luminance},
+        "point": {"intensity_cd": lux * square_m},
+        "spot": {"intensity_cd": lux * square_m, "beam_deg": beam, "cutoff_deg": 2 * beam},
+        "directional": {"illuminance_lux": lux},
+    }
+    lamp: Table = {name: round(value, 3) for name, value in values[kind].items()}
+    if kind == "directional":
+        lamp["direction"] = [b - a for a, b in zip(place, target, strict=True)]
+    else:
+        lamp["position_mm"] = place
+    if kind in ("area", "spot"):
+        lamp["target_mm"] = target
+    tint = random.choice(["D65", "D65", "A", "FL2"])
+    return [even_light, {"type": kind, "illuminant": tint} | lamp]

@@ -1,14 +1,37 @@
-"""Parts of scenes that networks are trained on: shapes, materials, walls, pictures, bars, lights."""
+"""Parts of scenes that networks are trained on: shapes, materials, walls; and curved shapes as meshes,
+made of random numbers: bumpy blobs and heads, cones and vases, rings and knots.
 
+A curved surface is a grid of points (rows, columns, 3) in units of about its own radius. It is written as a
+PLY file of quads with texture coordinates, named after its content. Axes are the world's: Y down, Z forward.
+"""
+
+import hashlib
 import math
+from pathlib import Path
 from random import Random
 
-from simgen.drawn import composition as draw
-from simgen.drawn.composition import UPRIGHT, Material, Objects, Table, Triple
-from simgen.drawn.curved_shapes import mesh_of, rod
+import numpy as np
+
+from pcii.base import write_bytes_safely
+from simgen.base import cache_folder
+from simgen.drawn import kinds as draw
+from simgen.drawn.kinds import UPRIGHT, Material, Objects, Table, Triple
 
 HALF_FIELD = 0.36
 """Half of what a camera sees, by its depth."""
+ROWS, COLUMNS = 64, 128
+HEADER = """ply
+format binary_little_endian 1.0
+element vertex {vertices}
+property float x
+property float y
+property float z
+property float s
+property float t
+element face {faces}
+property list uchar int vertex_indices
+end_header
+"""
 
 
 def any_shape(random: Random, size_mm: float, kind: str | None = None) -> tuple[Table, float, float]:
@@ -36,7 +59,7 @@ def any_turn(random: Random) -> Triple:
 
 
 def any_material(random: Random, pixels: int = 512) -> Table:
-    """Noise, one draw.colour, stripes, checks, a star, text or metal."""
+    """Noise, one colour, stripes, checks, a star, text or metal."""
     two = [draw.colour(random, 0.1, 0.5), draw.colour(random, 0.4, 0.9)]
     if random.random() < 0.25:
         return {"reflectance": draw.colour(random, 0.1, 0.9)}
@@ -65,16 +88,8 @@ def any_material(random: Random, pixels: int = 512) -> Table:
     return {"texture": texture | {"pixels": pixels}}
 
 
-def nearly_alike(random: Random, material: Table) -> Table:
-    """The same material; of one colour a little lighter or darker."""
-    light = random.uniform(0.9, 1.1)
-    if "reflectance" not in material:
-        return material
-    return material | {"reflectance": [round(min(1.0, light * part), 3) for part in material["reflectance"]]}
-
-
 def large_material(random: Random) -> Table:
-    """What walls and floors are of: one draw.colour, shades that change slowly, or patterns."""
+    """What walls and floors are of: one colour, shades that change slowly, or patterns."""
     if random.random() < 0.35:
         return draw.plain(random)
     if random.random() < 0.6:
@@ -121,90 +136,147 @@ def add_room(random: Random, objects: Objects, wall_mm: float, floor_mm: float) 
             objects.add(f"{name}-wall", place, (0.0, 90.0, 0.0), shape, large_material(random))
 
 
-def add_pictures(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
-    """Add up to four pictures on the back wall, some of them in a frame, some of a few patches."""
-    for number in range(random.choice([0, 1, 1, 2, 3, 4])):
-        width, height = draw.log_uniform(random, 30, 250), draw.log_uniform(random, 30, 180)
-        reach = HALF_FIELD * wall_mm
-        x, y = random.uniform(-0.8, 0.8) * reach, random.uniform(-0.8 * reach, min(floor_mm, reach) - 20)
-        turned = 0.0, 0.0, random.choice([0.0, random.uniform(-8, 8)])
-        if random.random() < 0.5:
-            frame = draw.box_of(1.12 * width, 1.12 * height, 3)
-            objects.add(f"frame-{number}", (x, y, wall_mm - 1.6), turned, frame, draw.plain(random))
-        place, shape = (x, y, wall_mm - 3.3), draw.card(width, height)
-        objects.add(f"picture-{number}", place, turned, shape, any_material(random))
-        for patch in range(random.choice([0, 0, 3])):
-            place = x + random.uniform(-0.3, 0.3) * width, y + random.uniform(-0.3, 0.3) * height
-            shape = draw.card(random.uniform(0.1, 0.4) * width, random.uniform(0.1, 0.4) * height)
-            name, z = f"picture-{number}-{patch}", wall_mm - 3.6 - 0.3 * patch
-            objects.add(name, (*place, z), turned, shape, any_material(random, 128))
+def mesh_folder() -> Path:
+    """Where the files are; those that are there are not written again."""
+    return cache_folder() / "meshes"
 
 
-def add_narrow_things(random: Random, objects: Objects, z_mm: float) -> None:
-    """Add pickets, rods or wires beside each other, of one material, or two layers of them that cross."""
-    width = draw.log_uniform(random, 2.4, 20)
-    shape_of = random.choice(
-        [
-            lambda long: draw.card(width, long),
-            lambda long: draw.box_of(width, long, draw.log_uniform(random, 1, 12)),
-            lambda long: mesh_of(rod(), width / 2, long / 2, width / 2),
-        ]
-    )
-    spacing, tilt = width * draw.log_uniform(random, 1.5, 6), random.uniform(-90, 90)
-    count, disorder = max(3, min(24, round(320 / spacing))), random.choice([0.0, 1.0, 12.0])
-    material = draw.plain(random) if random.choice([True, False]) else any_material(random, 256)
-    for layer in range(random.choice([1, 1, 2])):
-        long = random.uniform(100, 400)
-        for number in range(count):
-            angle = tilt + 90 * layer
-            along = spacing * (number - (count - 1) / 2) + random.gauss(0, spacing * disorder / 30)
-            across = random.gauss(0, 0.04) * long
-            cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-            place = along * cosine - across * sine, along * sine + across * cosine, z_mm + 2.0 * layer
-            turned = 0.0, 0.0, angle + random.gauss(0, disorder)
-            objects.add(f"narrow-{layer}-{number}", place, turned, shape_of(long), material)
+def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
+    """The mesh of a grid of points (rows, columns, 3); `sizes_mm` is the length of one unit, for each axis or
+    for all three."""
+    rows, columns, _ = points.shape
+    right, up = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
+    vertices = np.concatenate([np.round(points, 4), right[..., None], up[..., None]], axis=-1).astype("<f4")
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1)
+    faces = np.empty(quads[..., 0].size, [("count", "u1"), ("corners", "<i4", 4)])
+    faces["count"], faces["corners"] = 4, quads.reshape(-1, 4)
+    header = HEADER.format(vertices=rows * columns, faces=faces.size).encode()
+    content = header + vertices.tobytes() + faces.tobytes()
+    file = mesh_folder() / f"{hashlib.sha256(content).hexdigest()[:24]}.ply"
+    if not file.exists():
+        write_bytes_safely(file, content)
+    scale = [round(size_mm, 2) for size_mm in sizes_mm]
+    return {"type": "mesh", "file": file.name, "scale": scale if len(scale) > 1 else scale[0]}
 
 
-def any_backdrop(random: Random, bright: list[float]) -> Table:
-    """Black, dark, or of this colour."""
-    (reflectance,) = random.choices([[0.02, 0.02, 0.02], [0.04, 0.04, 0.05], bright], weights=[2, 2, 1])
-    return {"z_mm": 2500.0, "reflectance": reflectance}
+def rod() -> np.ndarray:
+    """An upright prism of 32 sides, of radius and half length 1, in pieces: rays are slow to trace between
+    the long slivers of which a cylinder consists."""
+    line = np.array([(0.0, -1.0), *((1.0, height) for height in np.linspace(-1, 1, 41)), (0.0, 1.0)])
+    return _around(line, 32)
 
 
-def any_lights(random: Random, finishes: set[str]) -> list[Table]:
-    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
+def blob(random: Random) -> np.ndarray:
+    """A ball with bumps, stretched: waves over its surface, the shorter the lower."""
+    directions = _globe()
+    radius = np.ones(directions.shape[:2])
+    strength, roughness = draw.log_uniform(random, 0.05, 0.35), random.uniform(0.8, 1.8)
+    for _ in range(12):
+        frequency = draw.log_uniform(random, 1, 8)
+        wave = np.array([random.gauss(0, frequency) for _ in range(3)])
+        height = strength * frequency**-roughness
+        radius += height * np.sin(directions @ wave + random.uniform(0, 2 * math.pi))
+    stretch = [draw.log_uniform(random, 0.7, 1.3) for _ in range(3)]
+    return directions * np.maximum(radius, 0.3)[..., None] * stretch
 
-    Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
-    So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
-    """
-    even_light = draw.sky(round(draw.log_uniform(random, 20, 400), 1))
-    kinds = ["area", "area", "none"]
-    if "glass" in finishes:
-        kinds = ["none"]
-    elif not finishes:
-        kinds += ["point", "spot", "directional"]
-    kind = random.choice(kinds)
-    place, target = (
-        [round(random.uniform(*ends)) for ends in box]
-        for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
-    )
-    lux, square_m = draw.log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
-    side, beam = draw.log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
-    if kind == "none":
-        return [even_light]
-    luminance = lux * square_m / (side * side / 1e6)
-    values = {
-        "area": {"width_mm": side, "height_mm": side, "luminance_cd_m2": luminance},
-        "point": {"intensity_cd": lux * square_m},
-        "spot": {"intensity_cd": lux * square_m, "beam_deg": beam, "cutoff_deg": 2 * beam},
-        "directional": {"illuminance_lux": lux},
-    }
-    lamp: Table = {name: round(value, 3) for name, value in values[kind].items()}
-    if kind == "directional":
-        lamp["direction"] = [b - a for a, b in zip(place, target, strict=True)]
+
+def head(random: Random) -> np.ndarray:
+    """An egg that faces the cameras, with a nose, two hollows for eyes, a chin and a neck."""
+    directions = _globe()
+    radius = 1.0 + 0.05 * np.cos(3 * directions[..., 1])
+    nose, eyes = random.uniform(0.2, 0.4), random.uniform(0.08, 0.18)
+    features = [
+        ((0.0, random.uniform(0.05, 0.2), -1.0), nose, 0.16),
+        ((-0.35, -0.15, -0.9), -eyes, 0.2),
+        ((0.35, -0.15, -0.9), -eyes, 0.2),
+        ((0.0, 0.75, -0.65), random.uniform(0.0, 0.15), 0.25),
+        ((-1.0, 0.0, 0.0), 0.15, 0.15),
+        ((1.0, 0.0, 0.0), 0.15, 0.15),
+        ((0.0, 1.0, 0.15), random.uniform(0.2, 0.9), 0.4),
+    ]
+    for place, height, width in features:
+        away = np.linalg.norm(directions - np.array(place) / np.linalg.norm(place), axis=-1)
+        radius += height * np.exp(-((away / width) ** 2))
+    return directions * radius[..., None] * [random.uniform(0.7, 0.85), 1.0, random.uniform(0.8, 0.95)]
+
+
+def spindle(random: Random) -> np.ndarray:
+    """A cone, a capsule, a disc with a hole, a vase: a line that goes once around the upright axis."""
+    kind = random.choice(["cone", "capsule", "annulus", "vase", "vase"])
+    along = np.linspace(0, 1, ROWS)
+    if kind == "cone":
+        line = np.array([(0.0, -1.2), (draw.log_uniform(random, 0.4, 1), 0.8), (0.0, 0.8)])
+    elif kind == "capsule":
+        angle = np.linspace(-math.pi / 2, math.pi / 2, ROWS)
+        straight = random.uniform(0.3, 1.2) * np.sign(angle)
+        line = 0.6 * np.stack([np.cos(angle), np.sin(angle) + straight], axis=-1)
+    elif kind == "annulus":
+        inner, half = random.uniform(0.3, 0.8), draw.log_uniform(random, 0.03, 0.4)
+        line = np.array([(inner, -half), (1.0, -half), (1.0, half), (inner, half), (inner, -half)])
     else:
-        lamp["position_mm"] = place
-    if kind in ("area", "spot"):
-        lamp["target_mm"] = target
-    tint = random.choice(["D65", "D65", "A", "FL2"])
-    return [even_light, {"type": kind, "illuminant": tint} | lamp]
+        radius = random.uniform(0.35, 0.6) * np.ones(ROWS)
+        for number in range(1, 4):
+            radius += random.uniform(-0.25, 0.25) / number * np.cos(number * math.pi * along)
+        side = np.stack([np.maximum(radius, 0.12), 2 * along - 1], axis=-1)
+        line = np.concatenate([[(0.0, -1.0)], side, [(0.0, 1.0)]])
+    if len(line) < ROWS:
+        line = _evenly(line)
+    return _around(line, COLUMNS)
+
+
+def tube(random: Random) -> np.ndarray:
+    """A ring, round or wavy, a knot or a spring: a circle that goes along a curve."""
+    kind = random.choice(["ring", "ring", "wavy", "knot", "spring"])
+    along, thick = np.linspace(0, 2 * math.pi, 4 * ROWS), draw.log_uniform(random, 0.06, 0.4)
+    radius, depth, turns = np.ones_like(along), 0 * along, 1
+    if kind == "wavy":
+        waves, height = random.randint(3, 8), random.uniform(0.05, 0.2)
+        radius = radius + height * np.cos(waves * along)
+        depth = height * np.sin(waves * along)
+    elif kind == "knot":
+        turns, waves, thick = 2, random.choice([3, 5, 7]), min(thick, 0.15)
+        radius, depth = 0.75 + 0.3 * np.cos(waves * along), 0.3 * np.sin(waves * along)
+    elif kind == "spring":
+        turns, thick = random.randint(3, 6), min(thick, 0.12)
+        radius, depth = 0.5 * radius, np.linspace(-1, 1, along.size)
+    curve = np.stack([radius * np.cos(turns * along), radius * np.sin(turns * along), depth], axis=-1)
+    forward = np.gradient(curve, axis=0)
+    if kind != "spring":  # the curve closes
+        forward[[0, -1]] = forward[0] + forward[-1]
+    # Across the curve: away from the axis through the ring, and at right angles to both.
+    outward = np.stack([np.cos(turns * along), np.sin(turns * along), 0 * along], axis=-1)
+    sideways = _unit(np.cross(forward, outward))
+    outward = _unit(np.cross(sideways, forward))
+    angle = np.linspace(2 * math.pi, 0, ROWS // 2)[None, :, None]
+    return curve[:, None] + thick * (np.cos(angle) * outward[:, None] + np.sin(angle) * sideways[:, None])
+
+
+CURVED = blob, head, tube, tube, spindle
+"""What makes curved surfaces, tubes twice as often as others."""
+
+
+def _around(line: np.ndarray, columns: int) -> np.ndarray:
+    """The surface (rows, columns + 1, 3) of a line (rows, 2) of radii and heights about the upright axis."""
+    angle = np.linspace(-math.pi, math.pi, columns + 1)
+    radius, height = (line[:, part, None] + 0 * angle for part in (0, 1))
+    return np.stack([radius * np.sin(angle), height, -radius * np.cos(angle)], axis=-1)
+
+
+def _globe() -> np.ndarray:
+    """Directions (ROWS, COLUMNS + 1, 3) from the pole above to the one below, once around."""
+    east, south = np.meshgrid(
+        np.linspace(-math.pi, math.pi, COLUMNS + 1), np.linspace(-math.pi / 2, math.pi / 2, ROWS)
+    )
+    return np.stack([np.sin(east) * np.cos(south), np.sin(south), -np.cos(east) * np.cos(south)], axis=-1)
+
+
+def _evenly(line: np.ndarray) -> np.ndarray:
+    """`ROWS` points evenly along a line (N, 2)."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    even = np.linspace(0, length[-1], ROWS)
+    return np.stack([np.interp(even, length, part) for part in line.T], axis=-1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

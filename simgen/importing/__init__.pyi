@@ -1,1 +1,1 @@
-from .scene_import import ImportedScene as ImportedScene, import_scene as import_scene
+from .scene_import import import_scene as import_scene, ImportedScene as ImportedScene

@@ -4,7 +4,6 @@ import base64
 import hashlib
 import json
 import tempfile
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote
@@ -14,7 +13,8 @@ import numpy as np
 from pcii.base import InputError
 from simgen.assets import read_texture
 from simgen.base import LARGEST_FILE_BYTES, LONGEST_NAME, asset, shorten
-from simgen.importing.gltf_document import Document, checked_document
+from simgen.importing.foreign_scene import ForeignScene
+from simgen.importing.gltf_document import checked_document
 from simgen.spec import names_of_objects
 
 COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
@@ -24,24 +24,32 @@ SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 Item = TypeVar("Item")
 
 
-@dataclass(frozen=True, eq=False)
-class GltfFile:
-    """A file's document, the buffer behind its JSON, and what becomes of it beside objects and lights."""
+class GltfFile(ForeignScene):
+    """A .gltf or .glb file, whose other files are opened when they are needed.
 
-    path: Path
-    document: Document
-    left_out: dict[str, None]
-    """Names of what the file says and the scene does not have, in order and each once."""
-    binary: bytes
-    images: dict[str, np.ndarray] = field(default_factory=dict)
-    """Pixels (H, W) or (H, W, 3), uint8 or uint16, by the file name that materials of the scene use."""
-    _names: dict[bytes, str] = field(default_factory=dict)
-    _buffers: dict[int, np.ndarray] = field(default_factory=dict)
-    _pictures: dict[int, np.ndarray] = field(default_factory=dict)
+    Raises `InputError` for a file that is none or is too large, that is not as the specification says, and
+    whose meshes are compressed.
+    """
 
-    def lose(self, what: str) -> None:
-        """Name what the scene does not have."""
-        self.left_out[what] = None
+    def __init__(self, path: Path, unit_mm: float) -> None:
+        super().__init__(path, unit_mm)
+        if not path.is_file() or path.stat().st_size > LARGEST_FILE_BYTES:
+            raise InputError(f"{path}: there is no such file of at most {LARGEST_FILE_BYTES} bytes")
+        text, self._binary = _chunks(path, path.read_bytes())
+        try:
+            values = json.loads(text.decode("utf-8-sig"))
+        except (RecursionError, ValueError) as fault:
+            raise InputError(f"{path}: not a glTF file: {shorten(str(fault))}") from None
+        if not isinstance(values, dict):
+            raise InputError(f"{path}: not a glTF file: its JSON is no table")
+        self.document, left_out = checked_document(values, str(path))
+        self.left_out.update(dict.fromkeys(left_out))
+        compressed = sorted(COMPRESSED & {*self.document.extensions_required})
+        if compressed:
+            raise InputError(f"{path}: needs {', '.join(compressed)}; export it without compression")
+        self._names: dict[bytes, str] = {}
+        self._buffers: dict[int, np.ndarray] = {}
+        self._pictures: dict[int, np.ndarray] = {}
 
     def keep(self, name: str, pixels: np.ndarray) -> str:
         """The file name of a picture, one for all that are the same; `name` is what it is called."""
@@ -78,7 +86,7 @@ class GltfFile:
         number = view.buffer
         if number not in self._buffers:
             uri = self.item(self.document.buffers, number, "buffers").uri
-            binary = np.frombuffer(b"" if number else self.binary, np.uint8)
+            binary = np.frombuffer(b"" if number else self._binary, np.uint8)
             self._buffers[number] = binary if uri is None else self.content(uri, f"buffers[{number}]")
         return self._buffers[number][view.byte_offset :][: view.byte_length], view.byte_stride
 
@@ -128,28 +136,6 @@ class GltfFile:
         if accessor.normalized and dtype.kind in "iu":
             return np.maximum(values / np.float32(np.iinfo(dtype).max), -1).astype(np.float32)
         return values
-
-
-def read_gltf(path: Path) -> GltfFile:
-    """Read a .gltf or .glb file; the files that it names are opened when they are needed.
-
-    Raises `InputError` for a file that is none or is too large, that is not as the specification says, and
-    whose meshes are compressed.
-    """
-    if not path.is_file() or path.stat().st_size > LARGEST_FILE_BYTES:
-        raise InputError(f"{path}: there is no such file of at most {LARGEST_FILE_BYTES} bytes")
-    text, binary = _chunks(path, path.read_bytes())
-    try:
-        values = json.loads(text.decode("utf-8-sig"))
-    except (RecursionError, ValueError) as fault:
-        raise InputError(f"{path}: not a glTF file: {shorten(str(fault))}") from None
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: not a glTF file: its JSON is no table")
-    document, left_out = checked_document(values, str(path))
-    compressed = sorted(COMPRESSED & {*document.extensions_required})
-    if compressed:
-        raise InputError(f"{path}: needs {', '.join(compressed)}; export it without compression")
-    return GltfFile(path, document, dict.fromkeys(left_out), binary)
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from simgen.assets import MOST_FACES, MOST_VERTICES, Triangles
-from simgen.importing.foreign_scene import UPRIGHT, ForeignScene, Part
+from simgen.importing.foreign_scene import UPRIGHT, Part
 from simgen.importing.gltf_document import Node, Primitive, PunctualLight
-from simgen.importing.gltf_file import GltfFile, read_gltf
+from simgen.importing.gltf_file import GltfFile
 from simgen.importing.gltf_materials import Surface, light_values
 from simgen.spec import MOST_OBJECTS
 
@@ -35,24 +35,18 @@ MAY_BE_IN_WATTS = (
 )
 
 
-class GltfScene(ForeignScene):
-    """All that is taken from a .gltf or .glb file.
-
-    Matrices are (4, 4) float64, of columns (x, y, z, 1), from own axes to those of the file; an emission of 1
-    in the file has the luminance `cd_m2_per_emission`. Raises `InputError` for a file that is wrong, or that
-    cannot be read.
-    """
+class GltfScene(GltfFile):
+    """All that is taken from a .gltf or .glb file, in which an emission of 1 has the luminance
+    `cd_m2_per_emission`. Raises `InputError` for a file that is wrong."""
 
     def __init__(self, path: Path, unit_mm: float, cd_m2_per_emission: float) -> None:
         super().__init__(path, unit_mm)
-        self.gltf = read_gltf(path)
-        self.left_out, self.images = self.gltf.left_out, self.gltf.images
-        self._surface = cache(partial(Surface, self.gltf, cd_m2_per_emission))
+        self._surface = cache(partial(Surface, self, cd_m2_per_emission))
         self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
         self._triangles = 0
-        if (others := len(self.gltf.document.scenes) - 1) > 0:
+        if (others := len(self.document.scenes) - 1) > 0:
             self.lose(f"{others} more scenes of the file")
-        self._places = dict(_placed_nodes(self.gltf))
+        self._places = dict(_placed_nodes(self))
         for index in self._places:
             self._add_node(index)
         if cd_m2_per_emission == 1 and self.lamps and any("emission" in part.material for part in self.parts):
@@ -60,7 +54,7 @@ class GltfScene(ForeignScene):
 
     def _add_node(self, index: int) -> None:
         """The mesh, camera and light of a node."""
-        document, matrix = self.gltf.document, self._places[index]
+        document, matrix = self.document, self._places[index]
         node = document.nodes[index]
         if node.mesh is not None:
             copies = {"": np.eye(4)} if node.copies is None else self._copies(node.copies)
@@ -70,7 +64,7 @@ class GltfScene(ForeignScene):
             self.lose(f"nodes[{index}], {NOWHERE}")
             return
         if node.camera is not None:
-            camera = self.gltf.item(document.cameras, node.camera, "cameras")
+            camera = self.item(document.cameras, node.camera, "cameras")
             angle_deg = None
             if camera.yfov is not None and camera.aspect_ratio is not None:
                 half = np.tan(camera.yfov / 2) * camera.aspect_ratio
@@ -79,14 +73,14 @@ class GltfScene(ForeignScene):
             name = f"{name}-{index}" if name in self.cameras else name
             self.cameras[name] = matrix @ UPRIGHT, angle_deg
         if node.light is not None:
-            light = self.gltf.item(document.lights, node.light, "lights")
+            light = self.item(document.lights, node.light, "lights")
             if light.intensity > 0 and any(light.color):
                 self.lamps.append((matrix @ UPRIGHT, _lamp(light)))
 
     def _copies(self, attributes: dict[str, int]) -> dict[str, np.ndarray]:
         """Matrices (4, 4) of a mesh's copies in the node's axes, by ending (EXT_mesh_gpu_instancing)."""
         columns = {
-            name: self.gltf.numbers(attributes[name], f"VEC{len(default)}", MOST_OBJECTS)
+            name: self.numbers(attributes[name], f"VEC{len(default)}", MOST_OBJECTS)
             for name, default in COPIED.items()
             if name in attributes
         }
@@ -96,7 +90,7 @@ class GltfScene(ForeignScene):
         return {f"-{number}": matrix for number, matrix in enumerate(matrices, start=1)}
 
     def _add_mesh(self, node: Node, number: int, matrix: np.ndarray, index: int, copy: str) -> None:
-        mesh = self.gltf.item(self.gltf.document.meshes, number, "meshes")
+        mesh = self.item(self.document.meshes, number, "meshes")
         if node.skin is not None:
             matrix = np.eye(4)
         name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
@@ -111,14 +105,14 @@ class GltfScene(ForeignScene):
                 continue
             (triangles, material), ending = translated, ""
             if len(mesh.primitives) > 1:
-                materials = self.gltf.document.materials
+                materials = self.document.materials
                 of = "" if primitive.material is None else materials[primitive.material].name
                 ending = f"-{of or part + 1}"
             stem = f"{mesh.name or node.name or name}{ending}"
             self.parts.append(Part(f"{name}{ending}", matrix, triangles, stem, material))
             self._triangles += len(triangles.faces)
             if len(self.parts) > MOST_OBJECTS or self._triangles > MAX_TRIANGLES:
-                raise self.gltf.fault(
+                raise self.fault(
                     f"has more than {MOST_OBJECTS} objects or {MAX_TRIANGLES} triangles; join objects of one "
                     "material, and simplify meshes"
                 )
@@ -160,23 +154,23 @@ class GltfScene(ForeignScene):
             normals = None if normals is None else np.einsum("nab,nb->na", moved[:, :3, :3], normals)
         corners = np.arange(count)
         if primitive.indices is not None:
-            corners = self.gltf.numbers(primitive.indices, "SCALAR", 3 * MOST_FACES)[:, 0].astype(np.int64)
+            corners = self.numbers(primitive.indices, "SCALAR", 3 * MOST_FACES)[:, 0].astype(np.int64)
         faces = _faces(corners, primitive.mode)
         flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
         try:
             return Triangles.checked(positions, faces[~flat], normals, uv)
         except ValueError as fault:
-            raise self.gltf.fault(f"{where}: {fault}") from None
+            raise self.fault(f"{where}: {fault}") from None
 
     def _attribute(
         self, primitive: Primitive, name: str, kind: str, where: str, count: int | None = None
     ) -> np.ndarray:
         """The values (N, C) of a primitive's vertices, `count` of them if that is known."""
         if name not in primitive.attributes:
-            raise self.gltf.fault(f"{where}: has no {name}")
-        values = self.gltf.numbers(primitive.attributes[name], kind, MOST_VERTICES)
+            raise self.fault(f"{where}: has no {name}")
+        values = self.numbers(primitive.attributes[name], kind, MOST_VERTICES)
         if count is not None and len(values) != count:
-            raise self.gltf.fault(f"{where}: has {len(values)} elements of {name}, and {count} of POSITION")
+            raise self.fault(f"{where}: has {len(values)} elements of {name}, and {count} of POSITION")
         return values
 
     def _skinned(self, skin: int, primitive: Primitive, count: int, where: str) -> np.ndarray:
@@ -184,15 +178,15 @@ class GltfScene(ForeignScene):
 
         Section 3.7.3.3: the place of the node itself is of no account.
         """
-        values = self.gltf.item(self.gltf.document.skins, skin, "skins")
+        values = self.item(self.document.skins, skin, "skins")
         joints = np.array([self._places.get(joint, np.eye(4)) for joint in values.joints])
         if values.inverse_bind_matrices is not None:
-            inverse = self.gltf.numbers(values.inverse_bind_matrices, "MAT4", len(joints))
+            inverse = self.numbers(values.inverse_bind_matrices, "MAT4", len(joints))
             joints = joints[: len(inverse)] @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
         which = self._attribute(primitive, "JOINTS_0", "VEC4", where, count)
         weight = self._attribute(primitive, "WEIGHTS_0", "VEC4", where, count)
         if which.dtype.kind != "u" or which.max() >= len(joints):
-            raise self.gltf.fault(f"{where}: JOINTS_0: expected whole numbers below {len(joints)}")
+            raise self.fault(f"{where}: JOINTS_0: expected whole numbers below {len(joints)}")
         share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
         return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
 

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from pcii.base import InputError, new_folder_safely
 from pcii.exchange import write_png
 from simgen.assets import Triangles, ply_bytes
-from simgen.base import LARGEST_TOML_BYTES, shorten, toml_text, validate
-from simgen.importing.foreign_scene import ForeignScene, Part
+from simgen.base import LARGEST_TOML_BYTES, check_installed, shorten, toml_text, validate
+from simgen.importing.foreign_scene import MESH_KINDS, ForeignScene, MeshScene, Part
 from simgen.importing.gltf_scene import GltfScene
-from simgen.importing.mesh_scene import MESH_KINDS, MeshScene
 from simgen.renderer import backend, reference_to
 from simgen.spec import MitsubaFile, MitsubaXml, Scene, check_unscored, names_of_objects
 
@@ -92,6 +91,7 @@ def import_scene(
     `unscored` are names of objects that count in no score, such as a floor. Raises `pcii.InputError` for a
     file that cannot be read or has no such object, and for a folder that is there already.
     """
+    check_installed()
     path, folder = Path(file), Path(out)
     suffix = path.suffix.lower()
     is_mesh = suffix in MESH_KINDS
@@ -135,19 +135,15 @@ def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedSc
     if reference.unscored:  # Mitsuba alone knows the names of the objects
         reference_to(backend.load(), reference, path.parent)
     xml = MitsubaXml(path.parent, path.name)
-    names = (path.name, *xml.files)
-    scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=reference)
+    scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=reference, folder=path.parent)
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
-        (new / "scene.toml").write_bytes(toml_text(scene, [f"Refers to {path.name}."]).encode())
-        for name in names:
-            (new / name).parent.mkdir(parents=True, exist_ok=True)
-            (new / name).write_bytes((path.parent / name).read_bytes())
+        scene.save(new)
     of_sensors = "of a sensor place and medium are used"
     if reference.place_at_mm is not None:
         of_sensors = "of a sensor nothing is used, not even its medium, since the scene is placed"
     unused = f"{shorten(', '.join(xml.unused))}: recipes have them; {of_sensors}"
-    return ImportedScene(out, (unused,) if xml.unused else (), names)
+    return ImportedScene(out, (unused,) if xml.unused else (), (path.name, *xml.files))
 
 
 def _write_scene(

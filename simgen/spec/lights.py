@@ -4,17 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from simgen.base import (
-    Colour,
-    Direction,
-    EnvironmentName,
-    Length,
-    Position,
-    Positive,
-    Real,
-    Strict,
-    completed_by,
-)
+from simgen.base import Colour, Direction, EnvironmentName, Length, Position, Positive, Real, Strict
 from simgen.spectral import illuminant_names, known_illuminant
 
 NamedIlluminant = Annotated[
@@ -22,7 +12,7 @@ NamedIlluminant = Annotated[
     Field(
         max_length=40,
         description="a CIE illuminant by name, such as D65, A or FL2",
-        json_schema_extra=completed_by("enum", illuminant_names),
+        json_schema_extra=lambda schema: schema.update(enum=[*illuminant_names()]),
     ),
     AfterValidator(known_illuminant),
 ]

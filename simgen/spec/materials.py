@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from pcii.base import srgb_to_linear
-from simgen.base import Colour, ImageName, NonNegative, Positive, Real, Share, Strict, Whole, completed_by
+from simgen.base import Colour, ImageName, NonNegative, Positive, Real, Share, Strict, Whole
 from simgen.spec.lights import Illuminant, string_or_value
 from simgen.spectral import WAVELENGTH_NM, known_patch, patch_names
 
@@ -235,7 +235,7 @@ PatchName = Annotated[
     str,
     Field(
         description="one of the 24 ColorChecker patches, such as 'dark skin'",
-        json_schema_extra=completed_by("enum", patch_names),
+        json_schema_extra=lambda schema: schema.update(enum=[*patch_names()]),
     ),
     AfterValidator(known_patch),
 ]

@@ -16,8 +16,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base import InputError
 from simgen.base import AssetName, Length, Position, Strict, asset, shown_value
 
-LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
-"""Limits of all files together that make up a scene; Mitsuba's own parser has none."""
+MAX_INCLUDES = 100
+"""Files within files at most: more are a circle."""
 ASCII_AND_MORE = re.compile(r"latin-?1|iso-8859-\d+|windows-125\d", re.IGNORECASE)
 """Encodings that are read if all characters are ASCII, which are the same in UTF-8."""
 OF_RECIPES = {
@@ -76,26 +76,22 @@ class MitsubaXml:
     """What one pass over a Mitsuba scene `name` in a folder, and over what it includes, finds there.
 
     `files` are the files that it reads, itself left out, relative to the folder; `unused` is what recipes
-    have instead, with its parameters. Raises `InputError` that names file and line: for what is not XML or
-    too large, for entities, for a plugin that is no plain name, for files that are missing or outside the
-    folder.
+    have instead, with its parameters. Raises `InputError` that names file and line: for what is not XML, for
+    entities, for a plugin that is no plain name, for files that are missing or outside the folder.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
-        self._folder, self._elements, self._bytes = folder, 0, 0
+        self._folder = folder
         self._defaults: dict[str, str] = {}
         self._of_recipes: list[tuple[str, list[str]]] = []
         self.files = tuple(dict.fromkeys(self._read(name)))
         parts = [f"{what} ({', '.join(values)})" if values else what for what, values in self._of_recipes]
         self.unused = tuple(dict.fromkeys(parts))
 
-    def _read(self, name: str, folders: tuple[PurePosixPath, ...] = (), depth: int = 0) -> list[str]:
+    def _read(self, name: str, folders: tuple[PurePosixPath, ...] = ()) -> list[str]:
         """Names of the files that a file names; `folders` are those of the files that include it, from the
         last one to the first."""
         path = asset(self._folder, name, "mitsuba")
-        self._bytes += path.stat().st_size
-        if self._bytes > LARGEST_BYTES:
-            raise InputError(f"{path}: the XML of a scene may have {LARGEST_BYTES} bytes")
         names, data, parents = list[str](), path.read_bytes(), list[list[str] | None]()
         own_folder = PurePosixPath(name).parent
         folders = folders or (own_folder,)
@@ -113,9 +109,6 @@ class MitsubaXml:
                 refuse(f"the encoding {shown_value(stated)} is not read; save the file as UTF-8")
 
         def start(tag: str, attributes: dict[str, str]) -> None:
-            self._elements += 1
-            if self._elements > MOST_ELEMENTS or depth + len(parents) >= DEEPEST:
-                refuse(f"a scene may have {MOST_ELEMENTS} elements, {DEEPEST} deep")
             values = {key: self._completed(value) for key, value in attributes.items()}
             if fault := _fault_of(tag, values):
                 refuse(fault)
@@ -139,7 +132,9 @@ class MitsubaXml:
             asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
-                names.extend(self._read(file, searched, depth + len(parents)))
+                if len(searched) > MAX_INCLUDES:
+                    refuse(f"includes are more than {MAX_INCLUDES} deep, as in a circle")
+                names.extend(self._read(file, searched))
 
         parser.StartElementHandler, parser.EndElementHandler = start, lambda _: parents.pop()
         parser.StartDoctypeDeclHandler = lambda *_: refuse("a scene has no DOCTYPE and no entities")

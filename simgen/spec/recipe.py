@@ -6,19 +6,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.store import Terms
 from pcii.types import MOST_BITS, MOST_FRAMES, CameraGrid, Readout
-from simgen.base import (
-    LARGEST_MM,
-    Count,
-    Length,
-    NonNegative,
-    Positive,
-    Real,
-    Share,
-    Strict,
-    Title,
-    Whole,
-    completed_by,
-)
+from simgen.base import LARGEST_MM, Count, Length, NonNegative, Positive, Real, Share, Strict, Title, Whole
 from simgen.spectral import camera_names
 
 MAX_SHEAR_PX = 1e9
@@ -44,6 +32,7 @@ ViewPasses = Annotated[
         json_schema_input_type=bool | tuple[ViewPass, ...],
     ),
 ]
+CameraName = Annotated[str, Field(json_schema_extra=lambda schema: schema.update(examples=[*camera_names()]))]
 Efficiency = Annotated[Real, Field(gt=0, le=1)]
 Spread = Annotated[Real, Field(ge=0, le=LARGEST_MM)]
 Shear = Annotated[Real, Field(ge=-MAX_SHEAR_PX, le=MAX_SHEAR_PX)]
@@ -138,7 +127,9 @@ class Sensor(Strict):
 
     cfa: Cfa = "GRBG"
     """Bayer pattern by its first two rows, or "none" for a monochrome sensor."""
-    camera: Annotated[str | None, Field(json_schema_extra=completed_by("examples", camera_names))] = None
+    camera: Annotated[
+        str | None, Field(json_schema_extra=lambda schema: schema.update(examples=[*camera_names()]))
+    ] = None
     """A camera's spectral sensitivities: by a name that colour-science has, such as "Nikon 5100 (NPL)", or a
     CSV file beside the recipe. Light is then traced as spectra; without, as linear sRGB, which is faster."""
     quantum_efficiency: tuple[Efficiency, Efficiency, Efficiency] = (1.0, 1.0, 1.0)

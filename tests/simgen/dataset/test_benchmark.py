@@ -10,9 +10,9 @@ from small_benchmark import SCENE, written
 
 import pcii
 from pcii.base import InputError, command_line
-from pcii.store import CARD, CROISSANT, INDEX, LICENCE, hash_file, hash_json, verify
+from pcii.store import CARD, CERTIFICATE, CROISSANT, INDEX, LICENCE, hash_file, hash_json, verify
 from simgen.app import commands
-from simgen.dataset import CERTIFICATE, Definition, certify, load_definition, make_benchmark
+from simgen.dataset import Definition, certify, load_definition, make_benchmark
 from simgen.dataset.benchmark_making import BenchmarkSeries, compare
 
 pytestmark = pytest.mark.renders

@@ -57,12 +57,8 @@ def without_scene(made: Recipe) -> Capture:
     return capture_of(made, no_scene, made.seed)
 
 
-def no_noise(k: int, l: int) -> np.ndarray:
-    return np.zeros(3)
-
-
 def dense(made: Recipe) -> PhotonTable:
-    return draw_from_views(without_scene(made), mosaic_of, no_noise, PLAN, silent)[0]
+    return draw_from_views(without_scene(made), lambda k, l: (mosaic_of(k, l), np.zeros(3)), PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +159,7 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
     arrivals, log = draw_from_views(
-        without_scene(made), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
+        without_scene(made), lambda k, l: (k * mosaic_of(k, l), np.zeros(3)), PLAN, silent
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:

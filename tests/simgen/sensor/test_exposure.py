@@ -49,12 +49,12 @@ def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
 def dense(made: Recipe, built: RenderScene) -> PhotonTable:
     grid = made.grid.camera_grid()
 
-    def mosaic_of(k: int, l: int) -> np.ndarray:
+    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
-        return sense(image, made.cfa)
+        return sense(image, made.cfa), np.zeros(3)
 
     capture = capture_of(made, built, made.seed)
-    return draw_from_views(capture, mosaic_of, lambda k, l: np.zeros(3), planned(False), silent)[0]
+    return draw_from_views(capture, view_of, planned(False), silent)[0]
 
 
 def test_photons_per_radiance_are_those_by_hand() -> None:

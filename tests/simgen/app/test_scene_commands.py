@@ -9,7 +9,7 @@ import pytest
 from pcii.base import InputError, command_line
 from pcii.store import verify
 from simgen.app import commands as simgen_cli
-from simgen.app import list_recipes, list_scenes, write_new_recipe, write_new_scene
+from simgen.app import new_recipe, new_scene
 from simgen.check import lint
 from simgen.spec import load_recipe, load_scene
 
@@ -38,22 +38,22 @@ def test_a_scene_and_a_recipe_work_as_they_are_written() -> None:
 
 
 def test_a_recipe_is_of_the_scene_of_its_name_or_of_another() -> None:
-    write_new_scene("mine")
-    write_new_recipe("mine")
+    new_scene("mine")
+    new_recipe("mine")
     assert load_recipe("mine")[0].scene == "mine"
     Path("elsewhere").mkdir()
     Path("scenes/mine").rename("elsewhere/other")
-    write_new_recipe("by-path", "elsewhere/other")
+    new_recipe("by-path", scene="elsewhere/other")
     recipe, near = load_recipe("data_recipes/by-path.toml")
     assert recipe.scene == "../elsewhere/other"
     assert (load_scene(recipe.scene, near).folder or Path()).resolve() == Path("elsewhere/other").resolve()
-    write_new_recipe("drawn", "drawn_solids")
+    new_recipe("drawn", scene="drawn_solids")
     assert load_recipe("data_recipes/drawn.toml")[0].scene_number == 0
 
 
 def test_a_copy_has_the_files_and_the_comments_of_the_scene() -> None:
-    path = write_new_scene("copy", "two_objects")
-    assert path == Path("scenes/copy/scene.toml")
+    new_scene("copy", from_="two_objects")
+    path = Path("scenes/copy/scene.toml")
     assert "# A large lamp up to the left" in path.read_text()
     scene: Any = load_scene("copy")
     assert [thing.name for thing in scene.objects] == ["ball", "bird"]
@@ -61,35 +61,38 @@ def test_a_copy_has_the_files_and_the_comments_of_the_scene() -> None:
 
 
 def test_names_that_are_taken_and_scenes_that_cannot_be_copied_are_refused() -> None:
-    for write, name in itertools.product(
-        (write_new_scene, write_new_recipe), ("3d", "../a", "", "scene.toml")
-    ):
+    for write, name in itertools.product((new_scene, new_recipe), ("3d", "../a", "", "scene.toml")):
         with pytest.raises(InputError, match="NAME: expected a letter"):
             write(name)
     assert not list(Path().iterdir())
-    write_new_scene("mine")
-    write_new_recipe("mine")
+    new_scene("mine")
+    new_recipe("mine")
     before = Path("scenes/mine/scene.toml").read_bytes()
     for name in ("mine", "two_objects", "drawn_room"):
         with pytest.raises(InputError, match=f"NAME: '{name}' is the name of a scene already"):
-            write_new_scene(name, "desk")
+            new_scene(name, from_="desk")
     for name in ("mine", "paper"):
         with pytest.raises(InputError, match=f"NAME: '{name}' is the name of a recipe already"):
-            write_new_recipe(name)
+            new_recipe(name)
     for source, message in (("dezk", "did you mean 'desk'"), ("drawn_room", "drawn by number")):
         with pytest.raises(InputError, match=message):
-            write_new_scene("other", source)
+            new_scene("other", from_=source)
     assert Path("scenes/mine/scene.toml").read_bytes() == before
     assert [path.name for path in Path("scenes").iterdir()] == ["mine"]
 
 
-def test_lists_name_what_is_there_and_a_broken_file_does_not_hide_the_others() -> None:
+def test_lists_name_what_is_there_and_a_broken_file_does_not_hide_the_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     for file in (Path("scenes/mine/scene.toml"), Path("data_recipes/mine.toml")):
         file.parent.mkdir(parents=True)
         file.write_text("titel = 3")
-    for listed, name in ((list_scenes(), "two_objects"), (list_recipes(), "paper")):
-        lines = {line.split()[0]: line for line in listed}
+    run("scenes")
+    for listed, name in zip(
+        capsys.readouterr().out.split("Recipes, of"), ("two_objects", "paper"), strict=True
+    ):
+        lines = {line.split()[0]: line for line in listed.splitlines() if line}
         assert "not valid: " in lines["mine"]
         assert "not valid: " not in lines[name]
         assert lines[name].split(maxsplit=1)[1]
-    assert "drawn by number" in list_scenes()[-1]
+        assert ("drawn_room" in lines) == (name == "two_objects")
