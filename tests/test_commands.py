@@ -127,6 +127,9 @@ def test_results_and_datasets_are_verified_by_one_command(
     for app, folder in itertools.product((simgen_cli.app, pcii_cli.app), (SAMPLE, results)):
         assert command_line.run(app, ["verify", str(folder)]) == 0
         assert "files match the manifest" in capsys.readouterr().out
+        assert command_line.run(app, ["verify", str(folder), "--json"]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        assert (answer["files"] > 10, answer["fault"]) == (True, None)
     broken = tmp_path / "broken"
     shutil.copytree(results, broken)
     (broken / "report.html").write_text("<p>better figures</p>")
@@ -134,6 +137,10 @@ def test_results_and_datasets_are_verified_by_one_command(
         assert command_line.run(app, ["verify", str(broken)]) == 2
         last = capsys.readouterr().err.splitlines()[-1]  # progress comes before
         assert last.startswith(f"error: {broken / 'report.html'}: truncated or changed")
+        assert command_line.run(app, ["verify", str(broken), "--json"]) == 2
+        answer = json.loads(capsys.readouterr().out)
+        assert answer["files"] is None
+        assert f"{broken / 'report.html'}: truncated or changed" in answer["fault"]
     assert "no such" in refusal(pcii_cli.app, ["verify", str(tmp_path / "nowhere")], capsys)
 
 
@@ -168,6 +175,8 @@ def test_help_of_every_command_has_examples_that_can_be_typed(
     for command in commands:
         assert command_line.run(app, [*command, "--help"]) == 0
         page = re.sub(r" *\\ *\n *", " ", capsys.readouterr().out)
+        for noise in ("--no-", "--empty-", "[default: ()]", "[default: False]", "\x1b"):
+            assert noise not in page, command
         examples = re.findall(rf"^ *{app.name[0]} ({command[0]} .*?) *$", page, re.MULTILINE)
         assert examples, command
         for example in examples:

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hostile_names import NAMES
@@ -15,17 +14,8 @@ from hostile_names import NAMES
 from pcii.app import commands as pcii_cli
 from pcii.app.command_options import depths_mm
 from pcii.base import Stages, answer_json, command_line, say, say_next, visible
-from pcii.store import MARKER, SAMPLE
+from pcii.store import MARKER
 from simgen.app import commands as simgen_cli
-
-
-def wait_for(path: Path) -> None:
-    for _ in range(2400):
-        if path.exists():
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"{path} did not come to be")
-
 
 ON = "stopped; the same command goes on from here"
 
@@ -39,7 +29,10 @@ def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
     settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2", "--set", "grid.cols=3"]
     command = ["generate", "small", "-o", str(out), *settings]
     process = subprocess.Popen([sys.executable, "-c", script, *command], stderr=subprocess.PIPE, text=True)
-    wait_for(out / "radiance" / "view_00_01.exr")
+    end = time.monotonic() + 120
+    while not (out / "radiance" / "view_00_01.exr").exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors.splitlines()[-1]) == (130, ON)
@@ -84,39 +77,11 @@ def test_of_an_unfinished_dataset_the_way_on_is_told(
     assert not out.exists()
 
 
-APPS = (simgen_cli.app, pcii_cli.app)
-
-
-@pytest.mark.parametrize("app", APPS)
-def test_a_verification_for_scripts_tells_the_fault(
-    app: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert command_line.run(app, ["verify", str(SAMPLE), "--json"]) == 0
-    good = json.loads(capsys.readouterr().out)
-    assert (good["files"] > 50, good["fault"]) == (True, None)
-    assert command_line.run(app, ["verify", str(tmp_path), "--json"]) == 2
-    bad = json.loads(capsys.readouterr().out)
-    assert bad["files"] is None
-    assert str(tmp_path) in bad["fault"]
-
-
 def test_depths_as_they_are_typed() -> None:
     assert len(depths_mm("500:501:0.1")) == 11  # 0.1 is not exact in binary
     for wrong in ("500:700", "700:500:20", "500:700:0", "a:b:c", "1:2:1e-9"):
         with pytest.raises(ValueError, match=r"start:stop:step|larger step"):
             depths_mm(wrong)
-
-
-def test_help_has_no_negative_options_no_empty_defaults_and_no_colours_in_a_pipe(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    for app in APPS:
-        for command in app:
-            if not command.startswith("-"):
-                assert command_line.run(app, [command, "--help"]) == 0
-                text = capsys.readouterr().out
-                for noise in ("--no-", "--empty-", "[default: ()]", "[default: False]", "\x1b"):
-                    assert noise not in text, (command, noise)
 
 
 def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:

@@ -39,6 +39,12 @@ def view(grid: CameraGrid, k: int, l: int) -> np.ndarray:
     return image
 
 
+def srgb(radiance: np.ndarray) -> np.ndarray:
+    """Radiance, of which 1 is white, as sRGB (IEC 61966-2-1)."""
+    share = np.clip(radiance, 0, 1)
+    return np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
+
+
 def write_planes(root: Path, grid: CameraGrid, cfa: str | None = None, *, view_truth: bool = False) -> Path:
     """A dataset of radiance, a mosaic if there is a pattern, and truth, with `view_truth` of every view."""
     images = np.array([[view(grid, k, l) for l in range(grid.cols)] for k in range(grid.rows)])

@@ -1,11 +1,11 @@
 """Radiance of any size: black, faint, bright, too bright, no number; values are right, or refused by name."""
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
-from rational_sections import samples_of, variance_of
-from twins import Reader, blocky_texture, patch_views, unit_grid
+from twins import Reader, blocky_texture, patch_views, samples_of, unit_grid, variance_of
 
 import pcii
 
@@ -86,6 +86,41 @@ def test_a_variance_just_below_the_largest_number_is_right() -> None:
         np.testing.assert_allclose(sections.variance.item(), 25 / 99 * 1e306, rtol=1e-12)
 
 
+def digits(found: float, certified: float) -> float:
+    """Number of correct decimal digits, at most 15: the logarithm of the relative error."""
+    return 15.0 if found == certified else min(15.0, -math.log10(abs(found / certified - 1)))
+
+
+@pytest.mark.parametrize(
+    ("values", "repeats", "mean", "deviation", "least"),
+    [
+        ([10000001, 10000003], 1, 10000002, 1, 11.5),
+        ([1.1, 1.3], 500, 1.2, 0.1, 11.5),
+        ([1000000.1, 1000000.3], 500, 1000000.2, 0.1, 8.5),
+        (
+            [10000000.1, 10000000.3],
+            500,
+            10000000.2,
+            0.1,
+            8.0,
+        ),  # float64 is off these by 2e-9 of the deviation
+    ],
+)
+def test_statistics_are_those_certified_for_nists_reference_data(
+    values: list[float], repeats: int, mean: float, deviation: float, least: float
+) -> None:
+    """NumAcc1 to 4: a datum is a view of one pixel. In float32 only whole numbers are those of the data."""
+    for dtype in (np.float64, np.float32)[: 1 + (repeats == 1)]:
+        light = np.array([mean, *values * repeats], dtype).reshape(1, -1, 1, 1, 1)
+        views = pcii.Views(light, unit_grid(*light.shape[:4]))
+        sections = pcii.reconstruct(views, 1e9, variance=True)
+        assert sections.variance is not None
+        single = sections.counts.dtype == np.float32  # results are rounded to it once
+        assert digits(sections.estimate.item(), mean) > (7 if single else 14)
+        found = float(np.sqrt(sections.variance, dtype=np.float64).item())
+        assert digits(found, deviation) > (7 if single else least)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("cfa", [None, "GRBG"])
 @pytest.mark.parametrize("ratio", [1e6, 1e12])
@@ -98,9 +133,10 @@ def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | 
     assert sections.variance is not None
     ulp = float(np.finfo(dtype).eps)
     for where, samples in samples_of(light, grid, 1.0, cfa=cfa).items():
-        np.testing.assert_allclose(sections.counts[0][where], float(sum(samples)), rtol=4 * ulp)
-        exact = float(variance_of(samples))
-        np.testing.assert_allclose(sections.variance[0][where], exact, rtol=8 * ulp, atol=1e-25)
+        np.testing.assert_allclose(sections.counts[0][where], math.fsum(samples), rtol=4 * ulp)
+        np.testing.assert_allclose(
+            sections.variance[0][where], variance_of(samples), rtol=8 * ulp, atol=1e-25
+        )
 
 
 @pytest.mark.parametrize("channels", [1, 3])

@@ -1,11 +1,8 @@
 """From no photon to 10^12 per view, and to the last photon that 64 bits hold: sums are exact, or refused."""
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
-from rational_sections import samples_of, variance_of
-from twins import unit_grid
+from twins import samples_of, unit_grid, variance_of
 
 import pcii
 from pcii.sections import view_samples
@@ -39,19 +36,8 @@ def test_sums_of_any_budget_are_those_of_python_integers(budget: int, cfa: str |
         for where, samples in expected.items():
             assert int(sections.counts[0][where]) == sum(samples)
             assert sections.coverage[0][where] == len(samples)
-            assert sections.estimate[0][where] == float(sum(samples) / len(samples))
+            assert sections.estimate[0][where] == sum(samples) / len(samples)
         assert np.isfinite(sections.estimate).all()
-
-
-@pytest.mark.parametrize("budget", BUDGETS[:4])
-def test_variances_of_counts_are_exact(budget: int) -> None:
-    grid = unit_grid(3, 2, 4, 4, (0.9, 1.6))
-    film = film_of(budget, grid.shape_KLHW)
-    sections = pcii.reconstruct(pcii.PhotonCounts.from_dense(film, grid), 1.0, variance=True)
-    assert sections.variance is not None
-    for where, samples in samples_of(film[..., None], grid, 1.0).items():
-        # One rounding of each of numerator and denominator, and of the quotient.
-        np.testing.assert_allclose(sections.variance[0][where], float(variance_of(samples)), rtol=5e-16)
 
 
 @pytest.mark.parametrize("count", [10**10, LARGEST_COUNT])
@@ -90,7 +76,6 @@ def test_the_variance_over_views_is_right_in_bright_windows(level: int, differin
     counts = pcii.PhotonCounts.from_dense(film, grid)
     found = view_samples(counts, FocalPlanes.at_depths(grid, 1e6), 0, cell_px=4, window_cells=1)
     samples = [int(total) for total in film.sum(axis=(2, 3)).ravel()]
-    mean, exact = np.mean(samples), float(variance_of([*map(Fraction, samples)]))
     assert found.number.item() == 9
-    np.testing.assert_allclose(found.mean.item(), mean, rtol=4e-16)
-    np.testing.assert_allclose(found.variance.item(), exact, rtol=1e-14)
+    np.testing.assert_allclose(found.mean.item(), np.mean(samples), rtol=4e-16)
+    np.testing.assert_allclose(found.variance.item(), variance_of(samples), rtol=1e-14)

@@ -1,6 +1,5 @@
 """`pcii run` on datasets that no recipe made: with and without truth, counts only, radiance only."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -17,44 +16,32 @@ GRID = CameraGrid(rows=2, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, h
 LIGHT = np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.float32)
 COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.2, GRID.shape_KLHW), GRID, cfa="GRBG")
 IDS = np.zeros((40, 48), np.int16)
-IDS[10:30, 10:30] = 1
-Z_MM = np.where(IDS > 0, 500.0, np.inf)
 
 
 def run(*arguments: object) -> int:
     return command_line.run(app, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("has", ["counts", "counts views depth"])
-def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: str) -> None:
-    truth = None
-    if "depth" in has:  # of surfaces without names, as in benchmarks of depth
-        truth = Truth(np.full((40, 48), 500.0), 0 * IDS, {})
-    images = (COUNTS, Views(LIGHT, GRID)) if "views" in has else COUNTS
+def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys) -> None:
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
-    dataset = save_dataset(tmp_path / "d", images, truth, z_mm=[500, 700], **texts)
-    assert run("run", tmp_path / "d", "-o", tmp_path / "out", "--method", "brightness") == 0
+    dataset = save_dataset(tmp_path / "d", COUNTS, z_mm=[500, 700], **texts)
+    fast = ["--method", "brightness", "--depth-method", "variance-sweep"]
+    assert run("run", tmp_path / "d", "-o", tmp_path / "out", *fast) == 0
     page = (tmp_path / "out" / "report.html").read_text()
-    assert all(
-        text in page for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16])
-    )
+    for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16]):
+        assert text in page
     capsys.readouterr()
     assert run("score", tmp_path / "d", tmp_path / "out") == 0
-    assert ("has no truth" in capsys.readouterr().out) == (truth is None)
+    assert "has no truth" in capsys.readouterr().out
     assert verify(tmp_path / "out") > 5
 
 
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
-    save_dataset(tmp_path / "d", Views(LIGHT, GRID), Truth(Z_MM, IDS, {1: "ball"}), z_mm=500)
-    out = tmp_path / "out"
-    assert run("run", tmp_path / "d", "-o", out) == 0
+    # Surfaces without names, as in benchmarks of depth.
+    save_dataset(tmp_path / "d", Views(LIGHT, GRID), Truth(np.full((40, 48), 500.0), 0 * IDS, {}), z_mm=500)
+    assert run("run", tmp_path / "d", "-o", tmp_path / "out") == 0
     assert "sections and depth only" in capsys.readouterr().out
-    page = (out / "report.html").read_text()
-    assert "without photon counts" in page
-    assert "full light (Eq. 2)" in page
-    assert "Figure 7" not in page
-    assert "<h2>Depth" in page
-    assert verify(out) > 3
+    assert verify(tmp_path / "out") > 3
 
 
 @pytest.mark.parametrize("command", [["segment"], ["run", "--method", "posterior"]])
@@ -88,30 +75,3 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert run(*command, *fast) == 0
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 700, 400) == 2
     assert "near must be less than far" in capsys.readouterr().err
-
-
-METHODS = """
-import numpy as np
-import pcii
-
-def remove(counts, sections):
-    return pcii.Segmented(sections.counts.sum(axis=-1) > 1, "mine", sections)
-
-def depth(data, z_range_mm):
-    return pcii.DepthMap(np.full(data.grid.shape_HW, 500.0), np.ones(data.grid.shape_HW))
-"""
-
-
-def test_methods_are_functions_of_files(tmp_path: Path, monkeypatch) -> None:
-    place = f"{tmp_path / 'own_methods_2.py'}:"
-    (tmp_path / "own_methods_2.py").write_text(METHODS)
-    monkeypatch.chdir(tmp_path)
-    save_dataset("d", COUNTS, Truth(Z_MM, IDS, {1: "ball"}), z_mm=500)
-    methods = ["--method", f"{place}remove", "--depth-method", f"{place}depth"]
-    assert run("run", "d", "-o", "all", *methods) == 0
-    assert run("segment", "d", "-o", "steps", *methods[:2]) == 0
-    assert run("depth", "d", "-o", "steps", "--method", f"{place}depth") == 0
-    assert run("score", "d", "steps") == 0
-    scores = [json.loads(Path(out, "score.json").read_text()) for out in ("all", "steps")]
-    assert scores[0] == scores[1]
-    assert {row["method"] for row in scores[0]["planes"]} == {"mine"}

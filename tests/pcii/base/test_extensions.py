@@ -12,10 +12,14 @@ from pcii.base import InputError, load_function
 from pcii.evaluation import named_methods
 
 CODE = """
-from pcii import Segmented
+import numpy as np
+from pcii import DepthMap, Segmented
 
 def remove(counts, sections):
     return Segmented(sections.counts[..., 0] > 0, "mine", sections)
+
+def depth(data, z_range_mm):
+    return DepthMap(np.full(data.grid.shape_HW, z_range_mm[0]), np.ones(data.grid.shape_HW))
 
 number = 3
 """
@@ -33,6 +37,7 @@ def test_a_function_of_a_file_or_a_module_is_a_method(
     name = name.format(folder=tmp_path)
     counts = even_light(unit_grid(2, 2, 5, 6), 0.5, seed=1)
     assert pcii.segment(counts, 1.0, method=name).method == "mine"
+    assert (pcii.estimate_depth(counts, (1.0, 2.0), method=name.replace("remove", "depth")).z_mm == 1).all()
     function = load_function(name)
     assert pickle.loads(pickle.dumps(function)) is function
     methods = named_methods([name, f"depth:{name}"])

@@ -52,24 +52,28 @@ def test_rows_of_other_software_are_measured_again(tmp_path: Path, monkeypatch: 
     package, out = tmp_path / "package", tmp_path / "out"
     package.mkdir()
     data = write_dataset(tmp_path / "data", 1, {OWN: 5})
-    methods = ["brightness", "learned", "depth:near"]
+    methods = ["brightness", "learned", "depth:near", "depth:own_method.py:map_depth"]
+    monkeypatch.chdir(tmp_path)
 
     def made_again() -> tuple[str, ...]:
         return evaluate([data], out, methods=methods).made_again
 
-    def install(weights: str) -> None:
+    def install(weights: str, end: str = "") -> None:
         files = {"strange/__init__.py": CODE, "strange/weights.txt": weights}
         install_package(package, monkeypatch, POINTS, files)
+        Path("own_method.py").write_text(CODE + end)
 
     install("1")
     assert made_again() == made_again() == ()
     before = (out / "rows.jsonl").read_bytes()
-    install("2")
-    (sentence,) = made_again()
-    assert sentence == "2 scores of depth:near, learned, since the source of strange has changed"
+    install("2", "\n")
+    assert {*made_again()} == {
+        "2 scores of depth:near, learned, since the source of strange has changed",
+        "1 scores of depth:map_depth, since the source of own_method.py has changed",
+    }
     assert (out / "rows.jsonl").read_bytes().startswith(before)
     rows = read_rows(out)
-    assert len(rows) == 3
+    assert len(rows) == 4
     assert {row["method"]: row["software"] for row in rows}["learned"] == software_of(NamedMethod("learned"))
     assert made_again() == ()
 

@@ -77,8 +77,8 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(tmp_
     expected = estimate_depth(LIGHT, (450, 800), method="structure-tensor")
     for number, (command, option) in enumerate([("depth", "--method"), ("run", "--depth-method")]):
         out = tmp_path / str(number)
-        asked = [command, *at_light, option, "structure-tensor", "-o", str(out)]
-        assert command_line.run(cli.app, asked) == 0
+        arguments = [command, *at_light, option, "structure-tensor", "-o", str(out)]
+        assert command_line.run(cli.app, arguments) == 0
         _, depth = load_estimates(out, both.at_light(Light.parse(FULL_LIGHT)))
         assert depth is not None
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
@@ -95,8 +95,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(tmp_
 def test_what_a_method_cannot_take_is_refused_before_any_work(
     tmp_path: Path, has: str, methods: list[str], budgets: list[Any], sentence: str
 ) -> None:
-    images = {"counts": COUNTS, "views": LIGHT, "both": (COUNTS, LIGHT)}[has]
-    data = saved(tmp_path / "alone", images)
+    data = saved(tmp_path / "alone", {"counts": COUNTS, "views": LIGHT}[has])
     with pytest.raises(InputError, match=sentence):
         evaluate([data.path], tmp_path / "out", methods=methods, budgets=budgets)
     assert not (tmp_path / "out").exists()

@@ -17,9 +17,7 @@ from pcii import (
     check_grid,
     import_arrays,
     import_hci,
-    import_images,
     import_lens_array,
-    reconstruct,
 )
 from pcii.types import disparity_px
 
@@ -88,10 +86,9 @@ def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
 def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Path) -> None:
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
-    told: list[str] = []
-    scene = import_hci(root, note=told.append)
-    assert scene.truth is None
-    assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
+    notes: list[str] = []
+    assert import_hci(root, note=notes.append).truth is None
+    assert notes == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
 
 def test_arrays_come_in(tmp_path: Path) -> None:
@@ -99,14 +96,12 @@ def test_arrays_come_in(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", light)
     views = import_arrays(tmp_path / "a.npy", OPTICS)
     np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
-    flat = light.reshape(6, H, W, 3)
-    counted = import_arrays(flat, OPTICS, grid=(2, 3))
+    counted = import_arrays(light.reshape(6, H, W, 3), OPTICS, grid=(2, 3))
     np.testing.assert_array_equal(np.asarray(counted.radiance), np.asarray(views.radiance))
-    down = import_arrays(flat, OPTICS, grid=(3, 2), order=ViewOrder(swap_axes=True))
-    np.testing.assert_allclose(down.view(2, 1), light[1, 2], rtol=1e-6)
-    swapped = import_arrays(light, OPTICS, order=ViewOrder(swap_axes=True))
-    assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
-    np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
+    for array, grid in ((light, None), (light.reshape(6, H, W, 3), (3, 2))):
+        swapped = import_arrays(array, OPTICS, grid=grid, order=ViewOrder(swap_axes=True))
+        assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
+        np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
 
 
 GRID = CameraGrid(rows=4, cols=5, pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025, height=60, width=60)
@@ -132,9 +127,9 @@ def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path,
     assert found.grid == GRID
     np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
     assert check_grid(found, (15, 100)).order is None
-    told: list[str] = []
-    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=told.append)
-    assert told == ["not used: room for 2 more columns and 1 more rows of lens images"]
+    notes: list[str] = []
+    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=notes.append)
+    assert notes == ["not used: room for 2 more columns and 1 more rows of lens images"]
     mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
     wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))
     assert wrong.order == ViewOrder(flip_rows=True, flip_cols=True)
@@ -162,16 +157,3 @@ def test_a_mosaic_that_cutting_would_break_is_refused(tmp_path: Path) -> None:
     for wrong in (replace(even, pitch_px=(3, 4)), replace(even, inverted=True)):
         with pytest.raises(InputError, match="is a mosaic"):
             import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
-
-
-def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:
-    """From the pictures of a plane, through files, to a section that is the plane again."""
-    grid = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 80, height=60, width=80)
-    views = render(grid, [Card(35 * 2 / (grid.pixel_mm * 4), seed=3)], cell=6)  # 4 px from view to view
-    for k, l in np.ndindex(3, 3):
-        write(tmp_path / f"{l}_{k}.tif", views[k, l].astype(np.float32))
-    found = import_images(tmp_path, "{col}_{row}.tif", OPTICS)
-    z_mm = 35 * 2 / (grid.pixel_mm * 4)
-    section = reconstruct(found, [z_mm]).estimate[0]
-    np.testing.assert_allclose(section[8:-8, 8:-8], views[1, 1, 8:-8, 8:-8], atol=1e-5)
-    np.testing.assert_allclose(section[8:-8, 8:-8], views[0, 2, 12:-4, 4:-12], atol=1e-5)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
+from rendered_planes import ABOVE_MM, plane_z_mm, srgb, view, write_planes
 from stored_datasets import rewrite_manifest
 
 import pcii
@@ -95,12 +95,6 @@ def test_depths_and_poses_fit_the_planes(tmp_path: Path, shear_px) -> None:
         np.testing.assert_allclose(posed.picture(number) / 255, numbers, atol=0.51 / 255)
 
 
-def srgb(radiance: np.ndarray) -> np.ndarray:
-    """Radiance, of which 1 is white, as sRGB (IEC 61966-2-1)."""
-    share = np.clip(radiance, 0, 1)
-    return np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
-
-
 def test_what_hits_nothing_has_no_depth(tmp_path: Path) -> None:
     grid = grid_of(1, 2)
     z_mm = np.full(grid.shape_KLHW, 500.0)
@@ -116,8 +110,8 @@ def test_photons_are_proportional_to_the_numbers(tmp_path: Path) -> None:
     dense = np.arange(12).reshape(grid.shape_KLHW) * 100
     counts = pcii.PhotonCounts.from_dense(dense, grid, cfa="GRBG")
     posed = exported(pcii.save_dataset(tmp_path / "data", counts).path)
-    told = {name: posed.top[name] for name in ("quantity", "unit", "white", "cfa")}
-    assert told == {"quantity": "photons", "unit": "photons", "white": 1100, "cfa": "GRBG"}
+    stated = {name: posed.top[name] for name in ("quantity", "unit", "white", "cfa")}
+    assert stated == {"quantity": "photons", "unit": "photons", "white": 1100, "cfa": "GRBG"}
     for l in range(2):
         photons = posed.picture(l) / 255 * 1100
         np.testing.assert_allclose(photons, np.repeat(dense[0, l, ..., None], 3, axis=2), atol=1100 / 510)

@@ -2,7 +2,7 @@
 """`pcii import` as a new user types it, and a dozen ways to give it something wrong."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm
 
 from pcii import CameraGrid, open_dataset, sample
-from pcii.base import linear_to_srgb
+from pcii.base import linear_to_srgb, srgb_to_linear
 from pcii.store import verify
 
 CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
@@ -63,71 +63,61 @@ def test_surfaces_of_photon_counts_are_where_the_depth_map_has_them(tmp_path: Pa
     cameras = ["--pitch-mm", 13.5, 13.5, "--focal-mm", 50, "--pixel-mm", 0.1408]
     limits = ["--counts", "--cfa", "GRBG", "--z-range-mm", 450, 750]
     assert run("import", tmp_path / "counts.npy", "-o", tmp_path / "out", *cameras, *limits) == 0
-    said = capsys.readouterr().out
-    (found,) = re.findall(
-        r"the depth map has most surfaces at (.*) mm; \d+% of its depths are right to 1 px", said
-    )
+    printed = capsys.readouterr().out
+    words = r"the depth map has most surfaces at (.*) mm; \d+% of its depths are right to 1 px"
+    (found,) = re.findall(words, printed)
     depths_mm = [float(z) for z in found.split(", ")]
     assert depths_mm == pytest.approx([539, 618], abs=8)  # medians of the ball and the bird; 15 mm are 1 px
     assert open_dataset(tmp_path / "out").analysis["z_mm"] == depths_mm
-    assert "sharpest" not in said
+    assert "sharpest" not in printed
+
+
+FIT = "warning: the views fit together far better "
+NOT_MIRRORED = ["--swap-axes", "--flip-cols"]
+WRONG_PITCH = ["--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
 
 
 @pytest.mark.parametrize(
-    ("pattern", "options", "mend"),
+    ("pattern", "options", "words"),
     [
-        ("{row}_{col}.png", [], "with --swap-axes"),
-        ("{col}_{row}.png", ["--swap-axes", "--flip-cols"], "without --swap-axes --flip-cols"),
+        ("{row}_{col}.png", CAMERAS, f"{FIT}with --swap-axes;"),
+        ("{col}_{row}.png", [*CAMERAS, *NOT_MIRRORED], f"{FIT}without --swap-axes --flip-cols;"),
+        ("{col}_{row}.png", WRONG_PITCH, "warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm"),
     ],
-)
-def test_the_option_that_mends_is_told(photos: Path, tmp_path: Path, capsys, pattern, options, mend) -> None:
-    told = ["--pattern", pattern, *CAMERAS, *options]
-    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
-    assert f"warning: the views fit together far better {mend};" in capsys.readouterr().out
-
-
-def pages(folder: Path, out: Path, places: Iterable[tuple[int, int]]) -> list[Any]:
-    """What to type for a file whose pages are the views of these places (k, l)."""
-    stack = np.stack([np.asarray(Image.open(folder / f"{l}_{k}.png")) for k, l in places])
-    tifffile.imwrite(out.with_suffix(".tif"), stack, photometric="rgb")
-    return ["import", out.with_suffix(".tif"), "-o", out, *CAMERAS]
+)  # fmt: skip
+def test_the_option_that_mends_is_named(
+    photos: Path, tmp_path: Path, capsys, pattern, options, words
+) -> None:
+    assert run("import", photos, "-o", tmp_path / "mine", "--pattern", pattern, *options) == 0
+    assert re.search(words, capsys.readouterr().out)
 
 
 def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) -> None:
-    assert run("import", photos, "-o", tmp_path / "files", *NAMED) == 0
-    assert run(*pages(photos, tmp_path / "pages", np.ndindex(3, 3))) == 0
-    down = [(k, l) for l in range(3) for k in range(3)]
-    assert run(*pages(photos, tmp_path / "down", down), "--swap-axes", "--grid", 3, 3) == 0
-    assert "warning" not in capsys.readouterr().out
-    files, *others = (open_dataset(tmp_path / name).views for name in ("files", "pages", "down"))
-    for other in others:
-        assert files is not None
-        assert other is not None
-        np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
+    across, down = list(np.ndindex(3, 3)), [(k, l) for l in range(3) for k in range(3)]
+    for name, places, options in (("across", across, []), ("down", down, ["--swap-axes", "--grid", 3, 3])):
+        file = tmp_path / f"{name}.tif"
+        stack = np.stack([np.asarray(Image.open(photos / f"{l}_{k}.png")) for k, l in places])
+        tifffile.imwrite(file, stack, photometric="rgb")
+        assert run("import", file, "-o", tmp_path / name, *CAMERAS, *options) == 0
+        assert "warning" not in capsys.readouterr().out
+        views = open_dataset(tmp_path / name).views
+        assert views is not None
+        np.testing.assert_allclose(views.view(1, 2), srgb_to_linear(stack[places.index((1, 2))]), rtol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("shear", "words"), [(0, "--shear-px, such as (2.[5-9]|3) (2.[5-9]|3);"), (2.7, "sharpest at 6")]
 )
-def test_shifted_pictures_are_told_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
+def test_shifted_pictures_are_said_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
     """A wall at 1.6 and a card at 3.9 px per camera, of which 2.7 px were taken out."""
     shifted = replace(GRID, shear_px=(2.7, 2.7))
     views = render(shifted, [Card(150, seed=1), Card(60, (0.2, 0.8, 0.2, 0.7), 2)], cell=8)
     np.save(tmp_path / "in.npy", views.astype(np.float32))
-    told = ["--shear-px", shear, shear] if shear else []
-    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *CAMERAS, *told) == 0
-    said = capsys.readouterr().out
-    assert re.search(words, said)
-    assert ("warning: things are sharp at disparities below 0" in said) == (shear == 0)
-
-
-def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
-    told = ["--pattern", "{col}_{row}.png", "--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
-    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
-    assert re.search(
-        r"warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm",
-        capsys.readouterr().out,
-    )
+    options = ["--shear-px", shear, shear] if shear else []
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *CAMERAS, *options) == 0
+    printed = capsys.readouterr().out
+    assert re.search(words, printed)
+    assert ("warning: things are sharp at disparities below 0" in printed) == (shear == 0)
 
 
 def test_other_sources(tmp_path: Path, capsys) -> None:

@@ -86,9 +86,9 @@ def test_one_length_tells_the_others(tmp_path: Path, film, focal_mm, pixel_mm) -
         camera_grid_of(file, find_grid(file), 50, 0.01, None, told.append)
 
 
-@pytest.mark.parametrize("numbers", [(0, 1, 2, 3, 4), (0, 4), (0, 1, 2, 3, 4, 5, 1)])
-def test_every_place_has_one_camera(tmp_path: Path, numbers) -> None:
-    frames = [frames_of(2, 3)[n] | {"file_path": f"{count}.png"} for count, n in enumerate(numbers)]
-    file = read(tmp_path, frames)
-    words = f"frames: {len(numbers)} cameras do not stand one at each place of a plane grid"
-    assert words in one_sentence(lambda: find_grid(file), file.path)
+def test_every_place_has_one_camera(tmp_path: Path) -> None:
+    for numbers in ((0, 1, 2, 3, 4), (0, 4), (0, 1, 2, 3, 4, 5, 1)):
+        frames = [frames_of(2, 3)[n] | {"file_path": f"{count}.png"} for count, n in enumerate(numbers)]
+        file = read(tmp_path, frames)
+        words = f"frames: {len(numbers)} cameras do not stand one at each place of a plane grid"
+        assert words in one_sentence(lambda file=file: find_grid(file), file.path)

@@ -60,37 +60,24 @@ def counts() -> PhotonCounts:
     return even_light(unit_grid(2, 2, 5, 6), 0.5, seed=1)
 
 
-def test_a_method_of_another_package_is_found_by_name(tmp_path, monkeypatch):
+def test_methods_of_another_package_are_found_by_name_and_imported_when_they_are_used(tmp_path, monkeypatch):
     assert removal_methods() == tuple(METHODS)
-    install(tmp_path, monkeypatch, good="strange_code:good")
-    assert removal_methods() == (*METHODS, "good")
+    install(tmp_path, monkeypatch, good="strange_code:good", broken="no_such_module:remove")
+    assert removal_methods() == (*METHODS, "good", "broken")
     focus = segment(counts(), [1.0, 2.0], method="good")
     np.testing.assert_array_equal(focus.in_focus, focus.sections.counts[..., 0] > 0)
-
-
-def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, broken="no_such_module:remove")
-    assert "broken" in removal_methods()
-    segment(counts(), 1.0, method="brightness")
-    with pytest.raises(
-        InputError, match=r"^method: 'broken' of the package strange cannot be loaded: .*no_such"
-    ):
+    words = r"^method: 'broken' of the package strange cannot be loaded: .*no_such"
+    with pytest.raises(InputError, match=words):
         segment(counts(), 1.0, method="broken")
 
 
-def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, posterior="strange_code:good")
-    with pytest.raises(
-        InputError, match=r"strange_code:good of the package strange needs another name than 'posterior'"
-    ):
+@pytest.mark.parametrize("name", ["posterior", "../good"])
+def test_the_name_of_a_built_in_and_one_that_makes_no_file_name_are_refused(tmp_path, monkeypatch, name):
+    install(tmp_path, monkeypatch, **{name: "strange_code:good"})
+    words = f"strange_code:good of the package strange needs another name than '{name}'"
+    with pytest.raises(InputError, match=words):
         removal_methods()
-    assert segment(counts(), 1.0, method="posterior").method == "posterior"
-
-
-def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
-    install(tmp_path, monkeypatch, **{"../good": "strange_code:good"})
-    with pytest.raises(InputError, match=r"needs another name than '\.\./good'"):
-        removal_methods()
+    assert segment(counts(), 1.0, method="brightness").method == "brightness"
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from stored_datasets import (
-    DENSE,
-    GRID,
-    IDS,
-    Z_MM,
-    flip_a_bit,
-    largest_file,
-    make_dataset,
-    one_sentence,
-    rewrite_manifest,
-)
+from stored_datasets import DENSE, flip_a_bit, largest_file, make_dataset, one_sentence, rewrite_manifest
 
 import pcii
 from pcii.app import commands
@@ -34,25 +24,7 @@ from pcii.store import (
     verify,
     write_exr_safely,
 )
-from pcii.types import Light, PhotonCounts
-
-# A dataset, read back
-
-
-@pytest.mark.parametrize("sparse", [True, False])
-def test_a_dataset_is_read_as_it_was_written(tmp_path, sparse):
-    dataset = open_dataset(make_dataset(tmp_path / "d", sparse=sparse))
-    assert dataset.grid == GRID
-    assert dataset.counts.is_sparse == sparse
-    expected = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG").events
-    for name in "klijn":
-        np.testing.assert_array_equal(getattr(dataset.counts.events, name), getattr(expected, name))
-    assert dataset.truth is not None
-    np.testing.assert_array_equal(dataset.truth.z_mm, Z_MM)
-    np.testing.assert_array_equal(dataset.truth.object_id, IDS)
-    assert dataset.truth.names == {1: "ball"}
-    assert dataset.views is not None
-    np.testing.assert_array_equal(dataset.views.view(1, 2), np.full((4, 5, 3), 5.0))
+from pcii.types import Light
 
 
 def test_what_a_dataset_does_not_have_is_none_or_refused_and_other_members_are_kept(tmp_path):
@@ -80,9 +52,6 @@ def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, spar
     assert all(set(array.attrs) == {"unit", "meaning", "units", "long_name"} for array in opened.values())
 
 
-# Damage
-
-
 @pytest.mark.parametrize(
     ("part", "read"),
     [(COUNTS, lambda d: d.counts), (TRUTH, lambda d: d.truth), (RADIANCE, lambda d: d.views.view(1, 2))],
@@ -100,8 +69,6 @@ def test_damage_is_found_on_opening_or_on_reading_and_leaves_other_parts_readabl
     assert "missing" in one_sentence(lambda: open_dataset(root), file)
 
 
-# Manifests
-
 ENTRY = {"bytes": 1, "sha256": "0" * 64}
 WRONG = [
     ({"cfa": "GRGB"}, "cfa: "),
@@ -116,9 +83,6 @@ def test_a_wrong_or_absent_member_of_a_manifest_is_named(tmp_path, members, word
     root = make_dataset(tmp_path / "d")
     rewrite_manifest(root, **members)
     assert words in one_sentence(lambda: open_dataset(root), root / MANIFEST)
-
-
-# Radiance
 
 
 def test_radiance_of_another_size_is_refused(tmp_path):
@@ -153,9 +117,6 @@ def test_radiance_comes_back_in_its_channels_and_in_single_precision(tmp_path, s
     np.testing.assert_array_equal(again, image)
     path.write_bytes(b"v/1\x01" + bytes(50))
     assert "cannot be read" in one_sentence(lambda: read_exr(path), path)
-
-
-# The sample
 
 
 def test_the_sample_is_small_and_whole_and_has_all_that_an_analysis_uses() -> None:

@@ -2,23 +2,30 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from stored_datasets import flip_a_bit, make_dataset
+from stored_datasets import flip_a_bit, make_dataset, one_sentence
 from tiny_datasets import OWN, write_dataset
 
-from pcii.base import InputError
+from pcii.base import InputError, write_bytes_safely
 from pcii.store import (
     COLLECTION_FOLDER,
+    DATASET_FOLDER,
     EVALUATION_FOLDER,
     MANIFEST,
     RESULTS_FOLDER,
     ROWS,
+    DatasetManifest,
+    check_free,
+    check_size,
     index_row,
     list_files,
     print_verification,
+    read_listed,
     read_manifest,
+    unlisted_files,
     verify,
     write_index,
 )
@@ -86,14 +93,61 @@ def test_every_damage_to_every_listed_file_is_found(
     verify(root)
 
 
-def test_files_that_no_manifest_lists_are_named(tmp_path: Path) -> None:
-    root = make_dataset(tmp_path / "d")
-    (root / "counts.zarr" / "extra").touch()
-    (root / "notes.txt").touch()
-    with pytest.raises(InputError, match=r"not listed in manifest\.json.*: counts\.zarr/extra, notes\.txt;"):
-        verify(root)
-
-
 def test_results_of_other_software_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     print_verification(make_results(tmp_path / "r", {"numpy": "0.1"}), as_json=False)
     assert "2 files match the manifest; other software made them: " in capsys.readouterr().out
+
+
+FOLDERS: list[Any] = [DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER]
+
+
+@pytest.fixture(params=FOLDERS, ids=lambda kind: kind.what)
+def kind(request: pytest.FixtureRequest) -> Any:
+    return request.param
+
+
+def test_only_new_and_empty_folders_and_those_of_its_kind_are_written_to(kind: Any, tmp_path: Path) -> None:
+    assert kind.guard(tmp_path / "new" / "deep") == kind.guard(tmp_path) == set()
+    (tmp_path / f".{kind.document}.x1.tmp").touch()  # left by a kill
+    assert kind.guard(tmp_path) == set()
+    for mark in kind.marks:
+        out = tmp_path / mark
+        out.mkdir()
+        (out / mark).touch()
+        (out / "part").touch()
+        assert kind.guard(out) == {mark, "part"}
+    file = tmp_path / "thesis.tex"
+    file.write_text("years of work")
+    for check in (kind.guard, lambda folder: check_free(folder, kind.what)):
+        assert "holds something else; name a new" in one_sentence(lambda c=check: c(tmp_path), tmp_path)
+        assert f"name a folder for the {kind.what}" in one_sentence(lambda c=check: c(file), file)
+    assert file.read_text() == "years of work"
+
+
+def test_a_document_that_is_missing_or_of_others_is_refused(kind: Any, tmp_path: Path) -> None:
+    path, nowhere, model = tmp_path / kind.document, tmp_path / "nowhere", DatasetManifest
+    assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere, model), nowhere)
+    assert f"`{kind.command}` makes one" in one_sentence(lambda: kind.read(tmp_path, model), tmp_path)
+    for change in ({"format": "of others"}, {"format_version": kind.version + 1}, {"format_version": None}):
+        kind.write(tmp_path, change)
+        assert f"expected a {kind.format}" in one_sentence(lambda: kind.read(tmp_path, model), path)
+    for content in (b"", b"[]", b'{"\xff": 1}'):
+        path.write_bytes(content)
+        assert "damaged" in one_sentence(lambda: kind.read(tmp_path, model), path)
+
+
+def test_files_are_listed_with_their_sizes_and_hashes(tmp_path: Path) -> None:
+    write_bytes_safely(tmp_path / "b" / "c.bin", b"abc")
+    write_bytes_safely(tmp_path / "a.bin", b"")
+    listed = list_files(tmp_path, ["b", "a.bin"])
+    # The SHA-256 of nothing and of "abc" are those of the standard's examples.
+    assert {name: (entry["bytes"], entry["sha256"][:16]) for name, entry in listed.items()} == {
+        "b/c.bin": (3, "ba7816bf8f01cfea"),
+        "a.bin": (0, "e3b0c44298fc1c14"),
+    }
+    flip_a_bit(tmp_path / "b" / "c.bin", 3)
+    check_size(tmp_path, "b/c.bin", listed["b/c.bin"])
+    path = tmp_path / "b" / "c.bin"
+    one_sentence(lambda: read_listed(tmp_path, "b/c.bin", listed["b/c.bin"]), path)
+    (tmp_path / "b" / "link").symlink_to(path)
+    assert unlisted_files(tmp_path, ["a.bin", "b/c.bin"]) == ["b/link"]
