@@ -18,16 +18,8 @@ def unit_grid(
     shear_px: tuple[float, float] = (0.0, 0.0),
 ) -> CameraGrid:
     """A grid whose parallax at z = 1 mm is `pitch_mm` read as pixels, exactly: focal and pixel are 1."""
-    return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=pitch_mm,
-        focal_mm=1.0,
-        pixel_mm=1.0,
-        height=height,
-        width=width,
-        shear_px=shear_px,
-    )
+    film = {"focal_mm": 1.0, "pixel_mm": 1.0, "height": height, "width": width}
+    return CameraGrid(rows=rows, cols=cols, pitch_mm=pitch_mm, shear_px=shear_px, **film)
 
 
 def paper_grid(height: int = 1024, width: int = 1024) -> CameraGrid:

@@ -2,14 +2,14 @@
 
 import html
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from report_outcomes import GRID, IDS, TRUTH, Written, outcome_of, page_of
 
-from pcii.app import Outcome
-from pcii.types import CameraGrid, PhotonCounts, Truth
+from pcii.types import PhotonCounts, Truth
 
 
 def words_of(page: str) -> str:
@@ -18,18 +18,8 @@ def words_of(page: str) -> str:
     return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)))
 
 
-@pytest.fixture
-def full(reports: dict[str, Written]) -> Outcome:
-    return reports["full"].outcome
-
-
-@pytest.fixture
-def page(reports: dict[str, Written]) -> str:
-    return reports["full"].page
-
-
 def test_one_camera_has_one_section_for_all_depths(tmp_path: Path) -> None:
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
+    grid = replace(GRID, rows=1, cols=1)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid)
     outcome = outcome_of(tmp_path / "d", counts, None, (500,))
     assert 'id="plane"' not in page_of(outcome, tmp_path)
@@ -46,7 +36,8 @@ def test_without_truth_or_counts_nothing_of_them_is_shown(reports: dict[str, Wri
     assert "by hand, 700 mm" in words
 
 
-def test_what_is_shown_has_the_truth_beside(full: Outcome, page: str, tmp_path: Path) -> None:
+def test_what_is_shown_has_the_truth_beside(reports: dict[str, Written], tmp_path: Path) -> None:
+    full, page = reports["full"].outcome, reports["full"].page
     words = words_of(page)
     for shown in (
         "truth: objects at 500 mm",

@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""Photon cubes and frames of strangers come in, and what is wrong is one sentence."""
+"""Photon cubes are what NumPy reads; those of strangers come in, or are refused in one sentence."""
 
 import json
 from collections.abc import Callable

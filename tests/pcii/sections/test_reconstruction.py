@@ -29,9 +29,6 @@ def photons(dense: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> Phot
     return PhotonCounts.from_dense(dense, grid, cfa=cfa)
 
 
-# Against the formula
-
-
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
 def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed)
@@ -63,23 +60,6 @@ def test_colours_never_mix_by_hand():
     assert red.tolist() == [10, 0, 20 + 30, 0]
     assert green.tolist() == [0, 2 + 3, 0, 4]
     assert blue.tolist() == [0, 0, 0, 0]
-
-
-# Defined answers at the edges
-
-
-@pytest.mark.parametrize("cfa", ["GRBG", None])
-def test_no_photons_give_zeros(cfa):
-    grid = unit_grid(2, 2, 3, 3, pitch_mm=(40.0, 40.0))  # so far apart that no view reaches the frame
-    empty = PhotonCounts.from_events(*np.zeros((5, 0), dtype=int), grid, cfa=cfa)
-    sections = reconstruct(empty, [1.0, 100.0])
-    assert not sections.counts.any()
-    assert not sections.estimate.any()
-    assert not sections.coverage[0].any()
-    assert sections.coverage[1].any()
-
-
-# Physics
 
 
 def views_of_a_plane(

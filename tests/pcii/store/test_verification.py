@@ -116,10 +116,12 @@ def test_only_new_and_empty_folders_and_those_of_its_kind_are_written_to(kind: A
         (out / mark).touch()
         (out / "part").touch()
         assert kind.guard(out) == {mark, "part"}
-    file = tmp_path / "thesis.tex"
+    work = tmp_path / "work"
+    work.mkdir()
+    file = work / "thesis.tex"
     file.write_text("years of work")
     for check in (kind.guard, lambda folder: check_free(folder, kind.what)):
-        assert "holds something else; name a new" in one_sentence(lambda c=check: c(tmp_path), tmp_path)
+        assert "holds something else; name a new" in one_sentence(lambda c=check: c(work), work)
         assert f"name a folder for the {kind.what}" in one_sentence(lambda c=check: c(file), file)
     assert file.read_text() == "years of work"
 

@@ -1,4 +1,4 @@
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from pcii.base import InputError
 from pcii.sections import reconstruct
 from pcii.types import (
     PATTERNS,
-    CameraGrid,
     DepthMap,
     FocalPlanes,
     PhotonCounts,
@@ -23,15 +22,6 @@ from pcii.types import (
     mosaic,
 )
 
-GOOD: dict[str, Any] = {
-    "rows": 2,
-    "cols": 3,
-    "pitch_mm": (5.0, 5.0),
-    "focal_mm": 50.0,
-    "pixel_mm": 0.03,
-    "height": 4,
-    "width": 6,
-}
 NAN = float("nan")
 
 
@@ -46,7 +36,7 @@ NAN = float("nan")
 )
 def test_a_camera_grid_that_cannot_be_is_refused_by_name(name, value, words):
     with pytest.raises(InputError, match=f"^{name}: .*{words}"):
-        CameraGrid(**{**GOOD, name: value})
+        replace(unit_grid(2, 3, 4, 6), **{name: value})
 
 
 FILM = unit_grid(1, 1, 2, 2)
