@@ -1,15 +1,79 @@
-"""report.html without a browser: what is in it, what is left out, and numbers that agree with the results."""
+"""report.html: what is in it and what is left out, agreement with the results; and in headless Chromium."""
 
+import base64
+import hashlib
 import html
+import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from report_outcomes import GRID, IDS, TRUTH, Written, outcome_of, page_of
 
-from pcii.types import PhotonCounts, Truth
+from pcii.app import Outcome, write_report
+from pcii.metrics import score
+from pcii.sections import reconstruct
+from pcii.store import depth_range_of, save_dataset
+from pcii.types import CameraGrid, DepthMap, PhotonCounts, Segmented, Truth, Views
+
+GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
+COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.2, GRID.shape_KLHW), GRID, cfa="GRBG")
+LIGHT = Views(np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.float32), GRID)
+IDS = np.zeros((40, 48), np.int16)
+IDS[10:30, 8:20], IDS[12:28, 28:40] = 3, 7
+Z_MM = np.select([IDS == 3, IDS == 7], [500.0, 700.0], np.inf)
+TRUTH = Truth(Z_MM, IDS, {3: "ball", 5: "unseen", 7: "card"})
+FOUND = np.where(IDS > 0, np.where(IDS > 0, Z_MM, 0) + np.linspace(-3, 5, 48), np.nan)
+
+
+def outcome_of(root: Path, images: Any, truth: Truth | None, z_mm: tuple[float, ...] = (500, 700)) -> Outcome:
+    """Results as `analyse` gives them, of a method that keeps the first object, with a depth by hand."""
+    dataset = save_dataset(root, images, truth, z_mm=list(z_mm), title="By hand")
+    sections = reconstruct(dataset.counts_or_views, z_mm)
+    focus: tuple[Segmented, ...] = ()
+    if dataset.has_counts:
+        kept = np.repeat((IDS == 3)[None], len(z_mm), axis=0)
+        focus = (Segmented(kept, "by hand", sections),)
+    depth = DepthMap(FOUND, np.where(np.isfinite(FOUND), 0.75, 0.0))
+    result = score(focus, depth, truth, grid=dataset.grid, dataset=dataset.name)
+    full_light = None if dataset.views is None else reconstruct(dataset.views, z_mm)
+    z_range_mm = depth_range_of(dataset)
+    return Outcome(dataset, full_light, sections, focus, depth, result, z_range_mm, {"depth": 1.0})
+
+
+class Written(NamedTuple):
+    """Results, and the report of them."""
+
+    outcome: Outcome
+    path: Path
+
+    @property
+    def page(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+
+def page_of(outcome: Outcome, folder: Path) -> str:
+    write_report(folder / "report.html", outcome)
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
+    """Reports with everything, of counts alone, and of light alone; where nothing is true."""
+    written: dict[str, Written] = {}
+    for name, images, truth in (
+        ("full", (COUNTS, LIGHT), TRUTH),
+        ("counts", COUNTS, None),
+        ("light", LIGHT, None),
+    ):
+        folder = tmp_path_factory.mktemp(name)
+        written[name] = Written(outcome_of(folder / "d", images, truth), folder / "report.html")
+        write_report(written[name].path, written[name].outcome)
+    return written
 
 
 def words_of(page: str) -> str:
@@ -70,3 +134,54 @@ def test_hardly_any_photons_and_no_objects_divide_nothing(
     words = words_of(page_of(outcome_of(tmp_path / "d", counts, truth), tmp_path))
     assert f"{photons} photon{'s' * (photons != 1)} in all" in words
     assert "nan" not in words
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+LOOK = """
+const faults = [], all = (selector) => [...document.querySelectorAll(selector)];
+for (const kind of ["error", "securitypolicyviolation"])
+    addEventListener(kind, (event) => faults.push(event.message || event.blockedURI), true);
+function look() {
+    const slider = document.querySelector("#plane"), states = [];
+    for (let value = 0; slider && value <= slider.max; value++) {
+        slider.value = value;
+        slider.dispatchEvent(new Event("input", {bubbles: true}));
+        states.push([all("#look .frame img").filter((image) => !image.hidden).map((image) => image.alt),
+            document.querySelector("#depth-shown").textContent, slider.getAttribute("aria-valuetext")]);
+    }
+    const fetched = performance.getEntriesByType("resource").map((entry) => entry.name);
+    return {states, faults, fetched: fetched.filter((name) => !name.startsWith("data:")),
+        text: document.body.innerText, overflow_px: document.documentElement.scrollWidth - innerWidth,
+        wide: all(".wide").every((box) => box.getBoundingClientRect().right <= innerWidth)};
+}
+addEventListener("load", () => { document.title = JSON.stringify(look()); });
+"""
+
+
+def look_at(page: str, width: int, folder: Path) -> dict[str, Any]:
+    """What `LOOK` finds on a copy of the page, whose policy names it beside the page's own script."""
+    own = base64.b64encode(hashlib.sha256(LOOK.encode()).digest()).decode()
+    policy = page.replace("script-src '", f"script-src 'sha256-{own}' '", 1)
+    copy = folder / "report.html"
+    copy.write_text(policy.replace("<title>", f"<script>{LOOK}</script><title>", 1), encoding="utf-8")
+    command = [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},1000"]
+    command += [f"--user-data-dir={folder / 'profile'}", "--dump-dom", copy.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    (title,) = re.findall("<title>(.*?)</title>", done.stdout, re.DOTALL)
+    return json.loads(html.unescape(title))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+@pytest.mark.parametrize(("name", "width"), [("full", 1200), ("full", 500), ("counts", 500), ("light", 1200)])
+def test_the_slider_moves_and_nothing_is_fetched_logged_or_cut_off(
+    reports: dict[str, Written], name: str, width: int, tmp_path: Path
+) -> None:
+    seen = look_at(reports[name].page, width, tmp_path)
+    assert (seen["faults"], seen["fetched"], seen["wide"]) == ([], [], True)
+    assert seen["overflow_px"] <= 0
+    assert "NaN" not in seen["text"]
+    depths = [float(text.split()[0]) for _, text, _ in seen["states"]]
+    assert len(depths) > 2
+    assert depths == sorted(set(depths))
+    assert all(images == [text] and text == spoken for images, text, spoken in seen["states"])

@@ -7,8 +7,7 @@ import h5py
 import numpy as np
 import OpenEXR
 import pytest
-from command_runs import check_refused, run
-from picture_folders import OPTICS
+from picture_folders import OPTICS, check_refused, run
 from PIL import Image
 from scipy.io import savemat
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from command_runs import check_refused, run
-from picture_folders import H, W, make_folder, numbers, write
+from picture_folders import H, W, check_refused, make_folder, numbers, run, write
 from PIL import Image
 from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm

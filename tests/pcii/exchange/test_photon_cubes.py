@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_runs import check_refused, run
-from picture_folders import OPTICS
+from picture_folders import OPTICS, check_refused, run
 from stored_datasets import one_sentence
 from twins import unit_grid
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_runs import run
-from picture_folders import H, W, numbers, write
+from picture_folders import H, W, numbers, run, write
 from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 
