@@ -1,23 +1,28 @@
-"""The commands as a user types them: results, exit codes, one sentence for bad input."""
+"""The commands as a user types them: results, what is printed, exit codes, one sentence for bad input."""
 
 import itertools
 import json
+import os
 import re
 import shlex
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zarr
 from cyclopts import App
+from hostile_names import NAMES
 
 from pcii.app import commands as pcii_cli
-from pcii.base import command_line
-from pcii.store import SAMPLE
+from pcii.app.command_options import depths_mm
+from pcii.base import Stages, answer_json, command_line, say, say_next, visible
+from pcii.store import MARKER, SAMPLE
 from simgen.app import commands as simgen_cli
-
-pytestmark = pytest.mark.renders
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +149,7 @@ def test_results_and_datasets_are_verified_by_one_command(
     assert "no such" in refusal(pcii_cli.app, ["verify", str(tmp_path / "nowhere")], capsys)
 
 
+@pytest.mark.renders
 def test_results_are_of_one_light(
     nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -183,6 +189,7 @@ def test_help_of_every_command_has_examples_that_can_be_typed(
             app.parse_args(shlex.split(example.split(" > ")[0]), exit_on_error=False, print_error=False)
 
 
+@pytest.mark.renders
 def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> None:
     for command, answer in (
         ("doctor", "Rendering will run with"),
@@ -195,6 +202,7 @@ def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> 
         assert answer in capsys.readouterr().out
 
 
+@pytest.mark.renders
 def test_export_writes_the_photons_of_a_budget(nested_dataset: Path, tmp_path: Path) -> None:
     command = ["export", str(nested_dataset), "--format", "events", "-o", str(tmp_path / "out")]
     assert command_line.run(simgen_cli.app, [*command, "--budget", "30"]) == 0
@@ -203,3 +211,104 @@ def test_export_writes_the_photons_of_a_budget(nested_dataset: Path, tmp_path: P
         assert arrays["photon_z_mm"].shape == (total,)
     # 6 views of 30 photons and 64 x 60 pixels of 0.01 dark counts: 410 counts, give or take 20.
     assert abs(total - 410) < 100
+
+
+ON = "stopped; the same command goes on from here"
+
+
+@pytest.mark.renders
+def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "small"
+    # A process that heeds Ctrl-C, whoever started this one.
+    script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    script += "from simgen.app.commands import main; sys.exit(main())"
+    settings = ["--set", "render.samples_per_pixel=4", "--set", "grid.rows=2", "--set", "grid.cols=3"]
+    command = ["generate", "small", "-o", str(out), *settings]
+    process = subprocess.Popen([sys.executable, "-c", script, *command], stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 120
+    while not (out / "radiance" / "view_00_01.exr").exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors.splitlines()[-1]) == (130, ON)
+    assert "Traceback" not in errors
+    assert command_line.run(simgen_cli.app, command) == 0
+    assert command_line.run(simgen_cli.app, ["verify", str(out)]) == 0
+
+
+@pytest.mark.parametrize(("resuming", "sentence"), [(["work"], ON), ([], "stopped")])
+def test_a_stop_that_became_another_exception_is_a_stop(
+    resuming: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app = command_line.command_app("works", "Works.")
+
+    @app.command
+    def work() -> None:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            raise RuntimeError("as Dr.Jit raises it") from None
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    assert command_line.run(app, ["work"], resuming=resuming) == 130
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
+    assert capsys.readouterr().err == f"{sentence}\n"
+
+
+UNFINISHED = "unfinished; the same `simgen generate` command goes on from here"
+
+
+@pytest.mark.parametrize("verb", ["run", "evaluate", "verify"])
+def test_of_an_unfinished_dataset_the_way_on_is_told(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begun, out = tmp_path / "sets" / "begun", tmp_path / "out"
+    begun.mkdir(parents=True)
+    (begun / MARKER).write_text("{}")
+    named = begun.parent if verb == "evaluate" else begun
+    more = [] if verb == "verify" else ["-o", str(out)]
+    assert command_line.run(pcii_cli.app, [verb, str(named), *more]) == 2
+    assert capsys.readouterr().err == f"error: {begun}: {UNFINISHED}\n"
+    assert not out.exists()
+
+
+def test_depths_as_they_are_typed() -> None:
+    assert len(depths_mm("500:501:0.1")) == 11  # 0.1 is not exact in binary
+    for wrong in ("500:700", "700:500:20", "500:700:0", "a:b:c", "1:2:1e-9"):
+        with pytest.raises(ValueError, match=r"start:stop:step|larger step"):
+            depths_mm(wrong)
+
+
+def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    app = command_line.command_app("works", "Works.")
+
+    @app.command
+    def fail(name: str) -> None:
+        answer_json({name: 1})
+        say(f"object {name}")
+        with Stages() as report:
+            report(name, 1, 1)
+        raise RuntimeError(name)
+
+    for name in NAMES:
+        assert command_line.run(app, ["fail", "--", name]) == 1
+        printed = capsys.readouterr()
+        lines = (printed.out + printed.err).split("\n")
+        assert [visible(line) for line in lines] == lines
+        assert json.JSONDecoder().raw_decode(printed.out)[0] == {name: 1}
+
+
+def test_a_terminal_has_bars_and_the_command_to_type_next(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True)
+    with Stages() as report:
+        for done in (0, 2):
+            report("[red] rows", done, 3)
+    say_next("pcii", "run", "a file")
+    printed = capsys.readouterr()
+    assert "[red] rows" in printed.err
+    assert "2/3" in printed.err
+    assert printed.out == "next:  pcii run 'a file'\n"

@@ -1,4 +1,4 @@
-"""The pages do what they say: their Python and their `sh` blocks run, from top to bottom."""
+"""The pages do what they say: their blocks run, and what they name exists."""
 
 import re
 import shutil

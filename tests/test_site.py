@@ -1,4 +1,4 @@
-"""The site: every public name is in the reference."""
+"""The site: every public name is in the reference, and every quoted figure is a measured one."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Training from examples to files: it takes steps, goes on, and what is exported says the same masks."""
+"""Training from examples to files: requests, steps, and the same masks from what is exported."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

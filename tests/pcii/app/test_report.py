@@ -49,11 +49,7 @@ class Written(NamedTuple):
     """Results, and the report of them."""
 
     outcome: Outcome
-    path: Path
-
-    @property
-    def page(self) -> str:
-        return self.path.read_text(encoding="utf-8")
+    page: str
 
 
 def page_of(outcome: Outcome, folder: Path) -> str:
@@ -65,14 +61,11 @@ def page_of(outcome: Outcome, folder: Path) -> str:
 def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
     """Reports with everything, of counts alone, and of light alone; where nothing is true."""
     written: dict[str, Written] = {}
-    for name, images, truth in (
-        ("full", (COUNTS, LIGHT), TRUTH),
-        ("counts", COUNTS, None),
-        ("light", LIGHT, None),
-    ):
+    contents = {"full": ((COUNTS, LIGHT), TRUTH), "counts": (COUNTS, None), "light": (LIGHT, None)}
+    for name, (images, truth) in contents.items():
         folder = tmp_path_factory.mktemp(name)
-        written[name] = Written(outcome_of(folder / "d", images, truth), folder / "report.html")
-        write_report(written[name].path, written[name].outcome)
+        outcome = outcome_of(folder / "d", images, truth)
+        written[name] = Written(outcome, page_of(outcome, folder))
     return written
 
 

@@ -1,4 +1,4 @@
-"""What the network of depth is given and gives, whatever its weights are."""
+"""What the network of depth is given and gives, and the posterior of a piecewise smooth surface."""
 
 from dataclasses import replace
 from itertools import product

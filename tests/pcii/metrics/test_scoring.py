@@ -1,4 +1,4 @@
-"""The score on masks and depths small enough to count by hand."""
+"""The score on masks, outlines and depths small enough to count by hand."""
 
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""Sections of counts and of views, sparse and dense: sums and variances of the samples at each voxel."""
+
 import numpy as np
 import pytest
 from hypothesis import given

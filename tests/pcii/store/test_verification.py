@@ -1,4 +1,4 @@
-"""Whatever happens to the files of a dataset, a collection, results or an evaluation is found."""
+"""Whose folder it is, its list of files, and that all that happens to them is found."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""Bayer patterns, and what the central types refuse."""
+
 from dataclasses import replace
 
 import numpy as np
