@@ -19,9 +19,6 @@ from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=11, width=13)
-EIGHTS = CameraGrid(
-    rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=4, width=16, shear_px=(1.5, 0)
-)
 FRAMES = 9
 
 
@@ -85,16 +82,6 @@ def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes,
     else:
         np.testing.assert_array_equal(counts.dense, seen.sum(axis=2))
         assert counts.frame is None
-
-
-@pytest.mark.parametrize(("grid", "cfa"), [(GRID, "GRBG"), (EIGHTS, None)])
-def test_exported_cubes_come_in_by_their_poses(tmp_path: Path, grid: CameraGrid, cfa: str | None) -> None:
-    cubes = write_cubes(tmp_path, bits_of(grid), grid, cfa)
-    assert run("import", cubes, "-o", tmp_path / "back", "--focal-mm", 50, "--counts") == 0
-    back = open_dataset(tmp_path / "back")
-    assert (back.cfa, back.grid.shape_KLHW, back.grid.shear_px) == (cfa, grid.shape_KLHW, grid.shear_px)
-    assert back.grid.pixel_mm == pytest.approx(grid.pixel_mm)
-    check_counts(back.counts, bits_of(grid))
 
 
 def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
