@@ -267,8 +267,8 @@ def test_no_module_shares_its_name_with_a_function() -> None:
         trees = {name: tree for name, tree in trees.items() if not name.endswith("commands")}
         leaves = {name.split(".")[-1] for name in trees}
         for name, tree in trees.items():
-            own = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-            assert not own & leaves, f"{name}: {sorted(own & leaves)}"
+            functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+            assert not functions & leaves, f"{name}: {sorted(functions & leaves)}"
 
 
 def test_importing_pcii_loads_no_renderer_and_no_compiler() -> None:

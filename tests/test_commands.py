@@ -36,11 +36,11 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def refusal(app: object, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """The one sentence with which a command refuses bad input."""
     assert command_line.run(app, arguments) == 2  # type: ignore[arg-type]
-    said = capsys.readouterr().err.strip()
-    assert said.startswith("error: ")
-    assert "\n" not in said
-    assert "Traceback" not in said
-    return said
+    message = capsys.readouterr().err.strip()
+    assert message.startswith("error: ")
+    assert "\n" not in message
+    assert "Traceback" not in message
+    return message
 
 
 def test_score_json_is_as_in_the_contract(results: Path) -> None:
@@ -109,14 +109,14 @@ def test_bad_input_to_simgen_is_refused_in_one_sentence(
     assert not out.exists()
 
 
-def test_bad_input_to_pcii_is_told_in_one_sentence(
+def test_bad_input_to_pcii_is_refused_in_one_sentence(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data, out = str(SAMPLE), str(tmp_path / "out")
-    said = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", "1.5", "-o", out], capsys)
-    assert "--subpixel: expected a whole number, got '1.5'" in said
-    said = refusal(pcii_cli.app, ["run", data, "--z-mm", "540", "--z-mm", "0.62", "-o", out], capsys)
-    assert "z_mm: 0.62 mm is so near that no views overlap" in said
+    message = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", "1.5", "-o", out], capsys)
+    assert "--subpixel: expected a whole number, got '1.5'" in message
+    message = refusal(pcii_cli.app, ["run", data, "--z-mm", "540", "--z-mm", "0.62", "-o", out], capsys)
+    assert "z_mm: 0.62 mm is so near that no views overlap" in message
     assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
     broken = tmp_path / "broken"
     shutil.copytree(SAMPLE, broken)
@@ -260,7 +260,7 @@ UNFINISHED = "unfinished; the same `simgen generate` command goes on from here"
 
 
 @pytest.mark.parametrize("verb", ["run", "evaluate", "verify"])
-def test_of_an_unfinished_dataset_the_way_on_is_told(
+def test_an_unfinished_dataset_is_named_with_the_command_that_goes_on(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     begun, out = tmp_path / "sets" / "begun", tmp_path / "out"

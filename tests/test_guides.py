@@ -221,10 +221,10 @@ def test_the_terms_of_the_guide_to_exchange_are_valid() -> None:
 def test_sentences_that_the_guide_explains_are_said() -> None:
     text = (DOCS / "what_to_do.md").read_text()
     sources = [file.read_text() for room in ("pcii", "simgen") for file in (ROOT / room).rglob("*.py")]
-    said = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))  # sentences that go on in the next line
+    text_of_sources = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))  # sentences that go on in the next line
     sentences = re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
     assert len(sentences) > 12
-    assert [sentence for sentence in sentences if sentence not in said] == []
+    assert [sentence for sentence in sentences if sentence not in text_of_sources] == []
 
 
 INLINE = re.compile(r"(?<!`)`((?:simgen|pcii) [^`]+)`(?!`)")
@@ -254,9 +254,9 @@ def test_commands_of_blocks_are_understood(page: Path) -> None:
                 continue
             for program, *arguments in commands(line):
                 if program in APPS:
-                    own = [word for word in arguments if word not in COMMON]
+                    known = [word for word in arguments if word not in COMMON]
                     try:
-                        APPS[program].parse_args(own, exit_on_error=False, print_error=False)
+                        APPS[program].parse_args(known, exit_on_error=False, print_error=False)
                     except CycloptsError as fault:
                         pytest.fail(f"{page.name}: {line.strip()}: {fault}")
 
@@ -269,11 +269,11 @@ def test_commands_and_options_of_sentences_exist(page: Path) -> None:
         if command.startswith("-"):
             continue
         assert command in app, f"{page.name}: {text}"
-        own = app[command]
-        if own.default_command is None and rest:  # a group of commands, such as `simgen benchmark make`
-            assert rest[0] in own, f"{page.name}: {text}"
-            own = own[rest.pop(0)]
-        options = [] if own.default_command is None else own.assemble_argument_collection()
+        parser = app[command]
+        if parser.default_command is None and rest:  # a group of commands, such as `simgen benchmark make`
+            assert rest[0] in parser, f"{page.name}: {text}"
+            parser = parser[rest.pop(0)]
+        options = [] if parser.default_command is None else parser.assemble_argument_collection()
         known = {name for each in options for name in each.names} | COMMON
         for word in rest:
             if re.match(r"--?[a-z]", word):

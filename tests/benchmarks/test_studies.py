@@ -60,7 +60,7 @@ def test_errors_of_sections_are_relative_to_the_contrast() -> None:
 
 
 @pytest.mark.parametrize("black_rows", [0, 500])
-def test_bias_is_told_from_noise_on_what_is_lit(black_rows: int) -> None:
+def test_bias_is_distinguished_from_noise_on_what_is_lit(black_rows: int) -> None:
     rng, truth = np.random.default_rng(3), np.zeros((32 + black_rows, 32, 3))
     truth[:32] = 1
     noisy = truth + truth * rng.normal(0, 0.5, (8, *truth.shape))
@@ -86,11 +86,11 @@ INNER = np.s_[5:-5, 5:-5]
 
 
 def test_peers_make_the_section_that_we_make() -> None:
-    own = reconstruct(Views(IMAGES[..., None], GRID), 1.0).estimate[0, ..., 0][INNER]
+    expected = reconstruct(Views(IMAGES[..., None], GRID), 1.0).estimate[0, ..., 0][INNER]
     for peer in (by_scipy, by_slices):
-        assert peer(IMAGES, GRID, 1.0)[INNER] == pytest.approx(own, abs=1e-6)
+        assert peer(IMAGES, GRID, 1.0)[INNER] == pytest.approx(expected, abs=1e-6)
     pytest.importorskip("cv2")
-    assert by_opencv(IMAGES, GRID, 1.0)[INNER] == pytest.approx(own, abs=1e-6)
+    assert by_opencv(IMAGES, GRID, 1.0)[INNER] == pytest.approx(expected, abs=1e-6)
 
 
 def test_the_plain_script_moves_views_as_we_do() -> None:

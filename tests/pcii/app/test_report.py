@@ -155,8 +155,8 @@ addEventListener("load", () => { document.title = JSON.stringify(look()); });
 
 def look_at(page: str, width: int, folder: Path) -> dict[str, Any]:
     """What `LOOK` finds on a copy of the page, whose policy names it beside the page's own script."""
-    own = base64.b64encode(hashlib.sha256(LOOK.encode()).digest()).decode()
-    policy = page.replace("script-src '", f"script-src 'sha256-{own}' '", 1)
+    digest = base64.b64encode(hashlib.sha256(LOOK.encode()).digest()).decode()
+    policy = page.replace("script-src '", f"script-src 'sha256-{digest}' '", 1)
     copy = folder / "report.html"
     copy.write_text(policy.replace("<title>", f"<script>{LOOK}</script><title>", 1), encoding="utf-8")
     command = [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},1000"]

@@ -157,7 +157,7 @@ def test_ctrl_c_and_a_kill_end_all_processes_in_the_midst_of_pieces(
     wait_for(lambda: not alive(workers), 10)
 
 
-def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_told_in_one_line(
+def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_is_one_line(
     started: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
     pytest.importorskip("distributed")

@@ -68,9 +68,9 @@ def test_a_requested_plane_is_three_times_as_probable_within_two_planes(monkeypa
 def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = run_network(random_inputs(), PLANES)
     monkeypatch.setattr("pcii.depth.surface_network.BAND_VALUES", 5 * 96 * 7)
-    for own, expected in zip(run_network(random_inputs(), PLANES), whole, strict=True):
+    for found, expected in zip(run_network(random_inputs(), PLANES), whole, strict=True):
         # The runtime may order sums otherwise for another size.
-        np.testing.assert_allclose(own, expected, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-6)
 
 
 def test_inputs_tell_how_much_light_there_is(two_squares) -> None:
@@ -91,8 +91,8 @@ def test_the_inputs_of_a_part_are_those_of_the_film(two_squares) -> None:
     film = METHOD.network_inputs(evidence, planes, 2, np.zeros(0))
     h, w = film.evidence.shape[1:]
     part = METHOD.network_inputs(evidence, planes, 2, np.zeros(0), (slice(h - 96, h), slice(32, w)))
-    for whole, own, side in zip(film[:4], part[:4], (1, 1, 2, 2), strict=True):
-        assert np.array_equal(whole[:, (h - 96) // side :, 32 // side :], own)
+    for whole, found, side in zip(film[:4], part[:4], (1, 1, 2, 2), strict=True):
+        assert np.array_equal(whole[:, (h - 96) // side :, 32 // side :], found)
 
 
 def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() -> None:

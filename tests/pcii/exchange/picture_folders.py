@@ -70,7 +70,7 @@ def check_refused(
     """An import ends with exit code 2 and one sentence that has these words, and leaves nothing."""
     capsys.readouterr()
     assert run("import", source, "-o", out, *options) == 2
-    *_, said = capsys.readouterr().err.strip().split("\n")
-    assert said.startswith("error: ")
-    assert re.search(words, said), said
+    *_, message = capsys.readouterr().err.strip().split("\n")
+    assert message.startswith("error: ")
+    assert re.search(words, message), message
     assert not out.exists()

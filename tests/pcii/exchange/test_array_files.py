@@ -125,9 +125,9 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     np.save(tmp_path / "views.npy", VIEWS_KLHW)
     arguments = [*CAMERAS, "--depth", tmp_path / name, *options]
     assert run("import", tmp_path / "views.npy", "-o", tmp_path / "out", *arguments) == 0
-    said = capsys.readouterr().out
-    assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in said
-    assert "24 of 480 pixels have no known depth there, and count in no score" in said
+    printed = capsys.readouterr().out
+    assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in printed
+    assert "24 of 480 pixels have no known depth there, and count in no score" in printed
     dataset = pcii.open_dataset(tmp_path / "out")
     truth = dataset.truth
     assert truth is not None
@@ -141,7 +141,7 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         [row["precision"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
         for kind in ("object", "pixel")
     )
-    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
+    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # objects have no names
     assert truth.mask_kind == "pixel"  # what reports show
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))

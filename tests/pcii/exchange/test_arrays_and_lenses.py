@@ -125,7 +125,7 @@ def lens_picture(path: Path, views: np.ndarray, *, inverted: bool, margin: int =
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path, inverted: bool) -> None:
+def test_a_lens_array_is_cut_apart_and_an_inverted_one_recognised(tmp_path: Path, inverted: bool) -> None:
     views = render(GRID, [Card(60, seed=1), Card(25, (0.2, 0.8, 0.2, 0.6), 2)], cell=6)
     path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
     optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)

@@ -1,6 +1,7 @@
 """What is exported is read by programs that know nothing of this package, and nothing is half written."""
 
 import json
+import shutil
 import tarfile
 from dataclasses import asdict
 
@@ -68,10 +69,10 @@ def test_a_dataset_that_lacks_what_is_needed_is_refused(tmp_path, format, kept):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.fixture
-def collection(tmp_path):
+@pytest.fixture(scope="module")
+def collection(tmp_path_factory):
     """Two datasets, by their seeds."""
-    root = tmp_path / "sweep"
+    root = tmp_path_factory.mktemp("collections") / "sweep"
     root.mkdir()
     rows = []
     for seed in (1, 2):
@@ -110,13 +111,12 @@ def test_shards_have_every_dataset_once_with_its_row(collection, tmp_path):
         assert contents[f"{n:06d}.npz"] == (single / "events.npz").read_bytes()
     again = pcii.export_dataset(collection, "webdataset", tmp_path / "again", budget=10)
     assert (again / "all-000000.tar").read_bytes() == (out / "all-000000.tar").read_bytes()
-    one_sentence(
-        lambda: pcii.export_dataset(collection / "seed_2", "webdataset", tmp_path / "one"),
-        collection / "seed_2",
-    )
+    single = collection / "seed_2"
+    one_sentence(lambda: pcii.export_dataset(single, "webdataset", tmp_path / "one"), single)
 
 
 def test_a_collection_is_exported_as_a_whole_or_not_at_all(collection, tmp_path):
+    collection = shutil.copytree(collection, tmp_path / "sweep")
     one_sentence(lambda: pcii.export_dataset(collection, "events", collection / "out"), collection / "out")
     damaged = largest_file(collection / "seed_2", COUNTS)
     flip_a_bit(damaged, 80)

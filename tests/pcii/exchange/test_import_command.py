@@ -39,9 +39,9 @@ def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "mine"
     limits = ["--cfa", "GRBG", "--photons", "300", "--z-range-mm", "30", "200"]
     assert run("import", photos, "-o", out, *NAMED, *limits) == 0
-    said = capsys.readouterr().out
-    assert "3 x 3 views of 90 x 120 px, GRBG" in said
-    assert "warning" not in said
+    printed = capsys.readouterr().out
+    assert "3 x 3 views of 90 x 120 px, GRBG" in printed
+    assert "warning" not in printed
     dataset = open_dataset(out)
     assert dataset.grid == GRID
     assert dataset.cfa == "GRBG"
@@ -305,16 +305,16 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
         first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
     linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
     first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
-    told: list[str] = []
+    notes: list[str] = []
     for profile in ("srgb", "other", "gimp"):
-        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=told.append)
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=notes.append)
     named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
-    assert [one for one in told if "profile" in one] == named
+    assert [one for one in notes if "profile" in one] == named
     raw = np.full((H, W), 500, np.uint16)
     tags = [(33422, "B", 4, b"\x02\x01\x01\x00", False), (50714, "H", 1, 256, False)]
     tifffile.imwrite(tmp_path / "0_0.tif", raw, extratags=tags)
-    import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=told.append)
-    assert told[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
+    import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=notes.append)
+    assert notes[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
     np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
     with pytest.raises(InputError, match="holds numbers up to 255; encoded light is 1 at white"):
         import_arrays(tmp_path / "0_0.npy", OPTICS, encoding="srgb")

@@ -115,14 +115,14 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
 
 @pytest.mark.parametrize("share", [0.01, 0.3])
 def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
-    rng, told = np.random.default_rng(1), []
-    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=told.append)
-    assert told == [
+    rng, notes = np.random.default_rng(1), []
+    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=notes.append)
+    assert notes == [
         "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
     ]
     counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
-    import_counts(counts, OPTICS, note=told.append)
-    assert len(told) == 1
+    import_counts(counts, OPTICS, note=notes.append)
+    assert len(notes) == 1
 
 
 @pytest.mark.parametrize(
@@ -130,11 +130,11 @@ def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None
     [(61, 64, "import again with --width 61"), (61, None, "import again with --width 61"), (50, 64, "cut them off the frames"), (61, 61, None)],
 )  # fmt: skip
 def test_columns_without_a_count_are_warned_of(lit: int, width: int | None, advice: str | None) -> None:
-    bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
+    bits, notes = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
-    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=told.append)
+    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=notes.append)
     words = f"warning: the last {64 - lit} columns of 64 have no count in any view; if the camera has fewer, {advice}"
-    assert told == ([] if advice is None else [words])
+    assert notes == ([] if advice is None else [words])
 
 
 def cubes(view: str = ".", **members: Any) -> Callable[[Path], Path]:

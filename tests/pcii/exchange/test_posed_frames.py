@@ -109,16 +109,16 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
         del frame["transform_matrix"][3]
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
     path.write_text(path.read_text(), "utf-16")
-    told: list[str] = []
-    file = read_transforms(path, note=told.append)
-    assert told == ["not used of transforms.json: aabb_scale, sharpness"]
+    notes: list[str] = []
+    file = read_transforms(path, note=notes.append)
+    assert notes == ["not used of transforms.json: aabb_scale, sharpness"]
     assert (file.height, file.width, file.focal_px) == (H, W, pytest.approx(50))
     assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]
     assert find_grid(file).pitch_mm == (10, 10)
 
 
 @pytest.mark.parametrize(
-    ("top", "frame", "told"),
+    ("top", "frame", "words"),
     [
         ({"fl_x": None, "fl_y": None}, {}, "fl_x: missing"),
         ({"fl_y": 1010.0}, {}, "fl_y: is 1010 where fl_x is 1000; pixels that are not square"),
@@ -130,7 +130,7 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
         ({}, {"fl_x": 1100, "fl_y": 1100}, r"frames\.1: 480 x 640 px and a focal length of 1100 px"),
     ],
 )
-def test_members_that_are_wrong_are_named(tmp_path: Path, top, frame, told) -> None:
+def test_members_that_are_wrong_are_named(tmp_path: Path, top, frame, words) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
     (folder / "out").symlink_to(tmp_path)
@@ -138,7 +138,7 @@ def test_members_that_are_wrong_are_named(tmp_path: Path, top, frame, told) -> N
     frames[1] |= frame
     path = written(folder, frames, **top)
     message = one_sentence(lambda: read_transforms(path), path)
-    assert re.match(rf"{path}: {told}", message), message
+    assert re.match(rf"{path}: {words}", message), message
 
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()
@@ -204,15 +204,15 @@ def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
     ],
 )
 def test_one_length_tells_the_others(tmp_path: Path, film, focal_mm, pixel_mm) -> None:
-    file, told = read(tmp_path, frames_of(2, 3), cx=330, cy=238), []
+    file, notes = read(tmp_path, frames_of(2, 3), cx=330, cy=238), []
     lengths = {"focal_mm": None, "pixel_mm": None, "sensor_mm": None} | film
-    grid = camera_grid_of(file, find_grid(file), **lengths, note=told.append)
+    grid = camera_grid_of(file, find_grid(file), **lengths, note=notes.append)
     assert (grid.focal_mm, grid.pixel_mm) == (focal_mm, pixel_mm)
     assert (grid.pitch_mm, grid.shape_KLHW) == ((5, 4), (2, 3, 480, 640))
-    assert "10 px to the right of their middle and -2 px below" in told[-1]
-    assert ("focal length and pixel size are not in transforms.json" in told[0]) == (film == {})
+    assert "10 px to the right of their middle and -2 px below" in notes[-1]
+    assert ("focal length and pixel size are not in transforms.json" in notes[0]) == (film == {})
     with pytest.raises(InputError, match="give one of them"):
-        camera_grid_of(file, find_grid(file), 50, 0.01, None, told.append)
+        camera_grid_of(file, find_grid(file), 50, 0.01, None, notes.append)
 
 
 def test_every_place_has_one_camera(tmp_path: Path) -> None:
@@ -260,9 +260,9 @@ def test_a_file_of_another_name_and_options_of_light_and_film(tmp_path: Path, ca
     source = posed(tmp_path / "data")
     path = (source / "transforms.json").rename(source / "train.json")
     dataset = imported(path, "--linear", "--cfa", "GRBG", "--photons", 50, "--focal-mm", 35)
-    said = capsys.readouterr().out
-    assert "pictures with a transforms.json of train.json" in said
-    assert "are not in train.json" not in said
+    printed = capsys.readouterr().out
+    assert "pictures with a transforms.json of train.json" in printed
+    assert "are not in train.json" not in printed
     assert (dataset.grid.focal_mm, dataset.grid.pixel_mm) == (35, 35 / 40)
     assert (dataset.cfa, dataset.light.photons) == ("GRBG", 50)
     assert dataset.views is not None

@@ -165,8 +165,8 @@ def photon_score(
     true = Truth(z, ids, {1: "near", 2: "far"}, photons, unscored=unscored)
     masks = np.zeros((1, 200, 200), dtype=bool)
     masks[0, 41, 41] = True  # where the event of three photons is projected to
-    said = None if kept is None else np.array([kept])
-    focus = Segmented(masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
+    in_focus = None if kept is None else np.array([kept])
+    focus = Segmented(masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=in_focus)
     rows = score(focus, None, true).planes
     assert all(row["iou"] is not None for row in rows)
     row = next(row for row in rows if row["truth"] == kind)

@@ -135,8 +135,8 @@ def test_views_on_disk_are_read_once_however_many_planes(monkeypatch: pytest.Mon
     monkeypatch.setattr("pcii.sections.dense_sections.MOST_BYTES", 0)  # too many for the memory
     again = pcii.estimate_depth(on_disk, (0.25, 2.0))
     assert len(reads) > 10 * len(cameras)
-    for own in (again, pcii.estimate_depth(everything, (0.25, 2.0))):
-        np.testing.assert_allclose(depth.z_mm, own.z_mm, rtol=1e-6)
+    for other in (again, pcii.estimate_depth(everything, (0.25, 2.0))):
+        np.testing.assert_allclose(depth.z_mm, other.z_mm, rtol=1e-6)
 
 
 @given(

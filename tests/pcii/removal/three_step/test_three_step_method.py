@@ -55,8 +55,8 @@ def test_finer_voxels_come_back_as_pixels_and_as_voxels(two_squares):
     assert focus.method == "three-step-subpixel-2"
     fine = focus.steps["fine"]
     assert fine.shape == (2, 512, 512)
-    for plane, own in enumerate(two_squares.masks):
-        assert intersection_over_union(focus.in_focus[plane], own) > (66 / 72) ** 2  # 3 px off all along
+    for plane, mask in enumerate(two_squares.masks):
+        assert intersection_over_union(focus.in_focus[plane], mask) > (66 / 72) ** 2  # 3 px off all along
         halves = fine[plane].reshape(256, 2, 256, 2).sum(axis=(1, 3)) >= 2
         np.testing.assert_array_equal(focus.in_focus[plane], halves)
 
@@ -182,6 +182,6 @@ def touching(photons: float):
 def test_objects_that_touch_are_cut_apart():
     counts, z_mm, masks = touching(0.06)
     focus = pcii.segment(counts, z_mm, method="three-step")
-    for plane, own in enumerate(masks):
+    for plane, mask in enumerate(masks):
         # Half of the far square's border is hidden from half of the views, 12 px wide of its 76.
-        assert intersection_over_union(focus.in_focus[plane], own) > 0.7
+        assert intersection_over_union(focus.in_focus[plane], mask) > 0.7
