@@ -90,9 +90,7 @@ def test_steps_one_by_one_give_the_same_score(results: Path, tmp_path: Path) -> 
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
 
 
-def test_bad_input_to_simgen_is_refused_in_one_sentence(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_bad_input_to_simgen_is_refused_in_one_sentence(capsys, tmp_path: Path) -> None:
     recipe, out = tmp_path / "r.toml", tmp_path / "out"
     generate = ["generate", str(recipe), "-o", str(out)]
     for text, message in (
@@ -109,9 +107,7 @@ def test_bad_input_to_simgen_is_refused_in_one_sentence(
     assert not out.exists()
 
 
-def test_bad_input_to_pcii_is_refused_in_one_sentence(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_bad_input_to_pcii_is_refused_in_one_sentence(capsys, tmp_path: Path) -> None:
     data, out = str(SAMPLE), str(tmp_path / "out")
     message = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", "1.5", "-o", out], capsys)
     assert "--subpixel: expected a whole number, got '1.5'" in message
@@ -126,9 +122,7 @@ def test_bad_input_to_pcii_is_refused_in_one_sentence(
     assert not Path(out).exists()
 
 
-def test_results_and_datasets_are_verified_by_one_command(
-    results: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_results_and_datasets_are_verified_by_one_command(results: Path, capsys, tmp_path: Path) -> None:
     for app, folder in itertools.product((simgen_cli.app, pcii_cli.app), (SAMPLE, results)):
         assert command_line.run(app, ["verify", str(folder)]) == 0
         assert "files match the manifest" in capsys.readouterr().out
@@ -150,9 +144,7 @@ def test_results_and_datasets_are_verified_by_one_command(
 
 
 @pytest.mark.renders
-def test_results_are_of_one_light(
-    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_results_are_of_one_light(nested_dataset: Path, capsys, tmp_path: Path) -> None:
     data, totals = str(nested_dataset), []
     for budget in ([], ["--budget", "400"], ["--budget", "120"], ["--budget", "30"]):
         out = tmp_path / "-".join(["out", *budget[1:]])
@@ -172,9 +164,7 @@ def test_results_are_of_one_light(
 
 
 @pytest.mark.parametrize("app", [simgen_cli.app, pcii_cli.app])
-def test_help_of_every_command_has_examples_that_can_be_typed(
-    app: App, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_help_of_every_command_has_examples_that_can_be_typed(app: App, capsys, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     commands = [[name] for name in app if not name.startswith("-")]
     commands += [[name, inner] for (name,) in commands for inner in app[name] if not inner.startswith("-")]
@@ -238,9 +228,7 @@ def test_a_stopped_generate_says_so_and_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("resuming", "sentence"), [(["work"], ON), ([], "stopped")])
-def test_a_stop_that_became_another_exception_is_a_stop(
-    resuming: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_stop_that_became_another_exception_is_a_stop(resuming: list[str], sentence: str, capsys) -> None:
     app = command_line.command_app("works", "Works.")
 
     @app.command
@@ -299,9 +287,7 @@ def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.Ca
         assert json.JSONDecoder().raw_decode(printed.out)[0] == {name: 1}
 
 
-def test_a_terminal_has_bars_and_the_command_to_type_next(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_terminal_has_bars_and_the_command_to_type_next(capsys, monkeypatch) -> None:
     for stream in ("stdout", "stderr"):
         monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True)
     with Stages() as report:

@@ -160,9 +160,7 @@ def case(name: str) -> object:
 
 @pytest.mark.guide
 @pytest.mark.parametrize("name", [case(name) for name in RUN])
-def test_a_page_runs(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
+def test_a_page_runs(name: str, tmp_path: Path, monkeypatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.chdir(tmp_path)
     if name != "first_hour.md":  # which begins in an empty folder
         copy_sample(Path("out/sample"))

@@ -53,9 +53,7 @@ def test_an_example_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # of PyTorch's exporter, which traces
-def test_what_is_trained_and_exported_says_the_same_masks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_trained_and_exported_says_the_same_masks(tmp_path: Path, monkeypatch) -> None:
     torch = pytest.importorskip("torch", reason="needs PyTorch, the extra `train`")
     pytest.importorskip("onnx", reason="needs onnx, the extra `train`")
     from training.batches import DEVICE, Examples

@@ -160,15 +160,6 @@ def opaque_views(surfaces: Sequence[tuple[np.ndarray, int, int, int]], grid: Cam
     return views
 
 
-def photons_of(
-    views: np.ndarray, grid: CameraGrid, per_view: float, *, seed: int, dark: float = 0.002
-) -> PhotonCounts:
-    """So many photons per view on average of views (K, L, H, W, 3) before the `dark`, behind GRBG."""
-    rates = views + dark
-    rates *= 3 * per_view * grid.view_count / rates.sum()  # a pixel sees one colour of three
-    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), grid, cfa="GRBG")
-
-
 def even_light(grid: CameraGrid, rate: float, seed: int, cfa: str | None = None) -> PhotonCounts:
     """So many photons per pixel of every view, and nothing to see."""
     film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)

@@ -28,9 +28,7 @@ number = 3
 @pytest.mark.parametrize(
     "name", ["{folder}/own_removal.py:remove", "own_removal.py:remove", "own_removal:remove"]
 )
-def test_a_function_of_a_file_or_a_module_is_a_method(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_a_function_of_a_file_or_a_module_is_a_method(tmp_path: Path, monkeypatch, name: str) -> None:
     (tmp_path / "own_removal.py").write_text(CODE)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path.copy())
@@ -56,9 +54,7 @@ def test_a_function_of_a_file_or_a_module_is_a_method(
         ("own_numbers.py:number", "is int, which cannot be called"),
     ],
 )
-def test_what_is_no_function_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, sentence: str
-) -> None:
+def test_what_is_no_function_is_refused(tmp_path: Path, monkeypatch, name: str, sentence: str) -> None:
     for file in ("own_numbers.py", "json.py"):
         (tmp_path / file).write_text(CODE)
     monkeypatch.chdir(tmp_path)

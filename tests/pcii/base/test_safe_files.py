@@ -4,15 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import pytest
 
 import pcii
 from pcii.base import locked, new_folder_safely, sweep_temporaries, write_bytes_safely
-
-
-def disk_is_full(handle: int) -> None:
-    raise OSError("disk is full")
 
 
 def test_a_file_is_whole_or_as_it_was_and_leaves_no_temporary(tmp_path, monkeypatch):
@@ -22,7 +19,7 @@ def test_a_file_is_whole_or_as_it_was_and_leaves_no_temporary(tmp_path, monkeypa
         assert path.read_bytes() == content
         assert [p.name for p in path.parent.iterdir()] == ["a.bin"]
     assert path.stat().st_mode & 0o777 == 0o644
-    monkeypatch.setattr(os, "fsync", disk_is_full)
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError("disk is full")))
     with pytest.raises(OSError, match=r"disk is full"):
         write_bytes_safely(path, b"new")
     assert path.read_bytes() == b"second, longer"

@@ -137,15 +137,6 @@ def test_brightness_claims_nothing_of_an_even_dark():
     assert not segment(dark, [0.5], method="brightness").in_focus.any()
 
 
-@pytest.mark.parametrize("method", ["brightness", "shape-from-focus"])
-@pytest.mark.parametrize(("count", "size"), [(3, (1, 1)), (2**40, (40, 44))])
-def test_an_even_section_has_one_class_and_it_is_dark(method, count, size):
-    # A saturated counter. Roundings of the root of a large count are too small a range for a histogram.
-    grid = unit_grid(3, 3, *size)
-    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa="GRBG")
-    assert not segment(counts, [0.5, 1.0], method=method).in_focus.any()
-
-
 def test_sharpness_beside_brightness_is_better_than_brightness(two_squares):
     method = "shape-from-focus"
     simple = segment(two_squares.counts, two_squares.z_mm, method="brightness").in_focus

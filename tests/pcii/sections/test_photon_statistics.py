@@ -132,16 +132,11 @@ def test_samples_of_a_flat_scene_have_the_variance_of_poisson_noise():
 GRID = unit_grid(2, 2, 64, 50)
 
 
-def uneven_rate() -> np.ndarray:
-    """Light (H, W) that changes over some tens of pixels, its mean 1."""
-    i, j = np.indices(GRID.shape_HW)
-    light = 1.2 + np.sin(i / 9) * np.cos(j / 7)
-    return light / light.mean()
-
-
 def saturated(rate: float, frames: int, bits: int) -> tuple[PhotonCounts, float]:
-    """Counts, and the share of the photons that is expected to be lost."""
-    rates, most = rate * uneven_rate() / frames, 2**bits - 1
+    """Counts of light that changes over some tens of pixels, and the expected share of lost photons."""
+    i, j = np.indices(GRID.shape_HW)
+    light, most = 1.2 + np.sin(i / 9) * np.cos(j / 7), 2**bits - 1
+    rates = rate * light / light.mean() / frames
     photons = np.random.default_rng(1).poisson(rates, (frames, *GRID.shape_KLHW))
     counts = np.minimum(photons, most).sum(axis=0)
     held = sum(stats.poisson.sf(n, rates) for n in range(most))

@@ -1,7 +1,6 @@
 """Photon counts, however they come, and frames of few bits beside a twin in decimals."""
 
 from decimal import Decimal, localcontext
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -111,14 +110,6 @@ def test_photons_of_views_are_poisson_numbers_of_their_own() -> None:
         limit_photons(Views(light, grid), 10, seed=-1)
 
 
-def minus_log(share: Fraction) -> Decimal:
-    """-ln(1 - share), to 40 digits."""
-    with localcontext() as context:
-        context.prec = 40
-        rest = 1 - share
-        return -(Decimal(rest.numerator) / Decimal(rest.denominator)).ln()
-
-
 @pytest.mark.parametrize("frames", [1, 16, 1000, MOST_FRAMES])
 def test_estimates_of_one_bit_are_those_of_a_twin_in_decimals(frames: int) -> None:
     samples = np.array([1, 3, 25, 100])
@@ -131,7 +122,8 @@ def test_estimates_of_one_bit_are_those_of_a_twin_in_decimals(frames: int) -> No
         if number == seen * frames:
             assert value == np.inf
             continue
-        exact = frames * minus_log(Fraction(number, seen * frames))
+        with localcontext(prec=40):
+            exact = -frames * (1 - Decimal(number) / (seen * frames)).ln()
         assert value == pytest.approx(float(exact), rel=4e-16, abs=0)
 
 
@@ -167,14 +159,10 @@ def test_estimates_of_more_bits_invert_the_mean_of_clipped_counts(bits: int) -> 
 FILM = unit_grid(2, 2, 4, 6)
 
 
-def with_frames() -> PhotonCounts:
+def test_frames_follow_their_events() -> None:
     pixels = np.array([[1, 0, 3, 5], [0, 1, 2, 4], [1, 0, 3, 5], [0, 1, 2, 0]]).T
     frame = np.array([4, 0, 3, 2, 0, 4, 1])
-    return PhotonCounts.from_events(*pixels, np.array([2, 1, 1, 3]), FILM, frames=5, bits=1, frame=frame)
-
-
-def test_frames_follow_their_events() -> None:
-    counts = with_frames()
+    counts = PhotonCounts.from_events(*pixels, np.array([2, 1, 1, 3]), FILM, frames=5, bits=1, frame=frame)
     e = counts.frame_events
     assert e is not None
     found = list(zip(*(column.tolist() for column in (e.k, e.l, e.i, e.j, e.frame)), strict=True))

@@ -169,19 +169,14 @@ def test_planes_are_the_cheapest_of_all_cuts_of_the_tree():
             np.testing.assert_array_equal(found[1:], expected[1:])
 
 
-def touching(photons: float):
+def test_objects_that_touch_are_cut_apart():
     """Two textured squares side by side at different depths, the nearer one over the border of the other."""
     grid, rng = unit_grid(7, 7, 256, 256), np.random.default_rng(2)
     near, far = (blocky_texture(rng, 80, 80) for _ in range(2))
-    rates = photons * opaque_views([(far, 90, 126, 3), (near, 90, 50, 7)], grid)
+    rates = 0.06 * opaque_views([(far, 90, 126, 3), (near, 90, 50, 7)], grid)
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=3), grid, cfa="GRBG")
     near_mask = square_mask(grid, 90, 50, 80)
-    return counts, (1 / 7, 1 / 3), (near_mask, square_mask(grid, 90, 126, 80) & ~near_mask)
-
-
-def test_objects_that_touch_are_cut_apart():
-    counts, z_mm, masks = touching(0.06)
-    focus = pcii.segment(counts, z_mm, method="three-step")
-    for plane, mask in enumerate(masks):
+    focus = pcii.segment(counts, (1 / 7, 1 / 3), method="three-step")
+    for plane, mask in enumerate((near_mask, square_mask(grid, 90, 126, 80) & ~near_mask)):
         # Half of the far square's border is hidden from half of the views, 12 px wide of its 76.
         assert intersection_over_union(focus.in_focus[plane], mask) > 0.7
