@@ -13,19 +13,8 @@ from PIL import Image
 from png_files import chunk, compressed, png_file
 from rendered_cards import Card, render
 
-from pcii import (
-    CameraGrid,
-    InputError,
-    LensArray,
-    Optics,
-    ViewOrder,
-    check_grid,
-    import_arrays,
-    import_counts,
-    import_hci,
-    import_images,
-    import_lens_array,
-)
+import pcii
+from pcii import CameraGrid, InputError, LensArray, Optics, ViewOrder
 from pcii.types import disparity_px
 
 PARAMETERS = """[intrinsics]
@@ -66,7 +55,7 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
     factor = 0.025 * 100.0 * W
     disparity = (factor * 4.25 / depth_m - factor) / 4.25 / 35.0
     pfm(root / name, depth_m if "depth" in name else disparity, scale)
-    scene = import_hci(root, note=[].append)
+    scene = pcii.import_hci(root, note=[].append)
     grid = scene.views.grid
     assert (grid.rows, grid.cols, grid.pitch_mm) == (3, 3, (25.0, 25.0))
     assert scene.truth is not None
@@ -79,12 +68,12 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
 
 
 def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
-    scene = import_hci(hci_folder(tmp_path / "scene"))
+    scene = pcii.import_hci(hci_folder(tmp_path / "scene"))
     assert scene.z_range_mm is None  # 8 px are so coarse that -1.6 px would be beyond infinity
     text = PARAMETERS.format(height=512, width=512, rows=1, cols=1)
     (tmp_path / "parameters.cfg").write_text(text)
     write(tmp_path / "input_Cam000.png", np.zeros((512, 512, 3), np.uint8))
-    scene = import_hci(tmp_path)
+    scene = pcii.import_hci(tmp_path)
     assert scene.z_range_mm is not None
     near, far = (float(disparity_px(scene.views.grid, z)[0]) for z in scene.z_range_mm)
     assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
@@ -94,19 +83,19 @@ def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Pat
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
     notes: list[str] = []
-    assert import_hci(root, note=notes.append).truth is None
+    assert pcii.import_hci(root, note=notes.append).truth is None
     assert notes == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
 
 def test_arrays_come_in(tmp_path: Path) -> None:
     light = np.random.default_rng(1).random((2, 3, H, W, 3))
     np.save(tmp_path / "a.npy", light)
-    views = import_arrays(tmp_path / "a.npy", OPTICS)
+    views = pcii.import_arrays(tmp_path / "a.npy", OPTICS)
     np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
-    counted = import_arrays(light.reshape(6, H, W, 3), OPTICS, grid=(2, 3))
+    counted = pcii.import_arrays(light.reshape(6, H, W, 3), OPTICS, grid=(2, 3))
     np.testing.assert_array_equal(np.asarray(counted.radiance), np.asarray(views.radiance))
     for array, grid in ((light, None), (light.reshape(6, H, W, 3), (3, 2))):
-        swapped = import_arrays(array, OPTICS, grid=grid, order=ViewOrder(swap_axes=True))
+        swapped = pcii.import_arrays(array, OPTICS, grid=grid, order=ViewOrder(swap_axes=True))
         assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
         np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
 
@@ -130,15 +119,15 @@ def test_a_lens_array_is_cut_apart_and_an_inverted_one_recognised(tmp_path: Path
     path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
     optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)
     lenses = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=inverted)
-    found = import_lens_array(path, lenses, optics, note=pytest.fail)
+    found = pcii.import_lens_array(path, lenses, optics, note=pytest.fail)
     assert found.grid == GRID
     np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
-    assert check_grid(found, (15, 100)).order is None
+    assert pcii.check_grid(found, (15, 100)).order is None
     notes: list[str] = []
-    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=notes.append)
+    pcii.import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=notes.append)
     assert notes == ["not used: room for 2 more columns and 1 more rows of lens images"]
     mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
-    wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))
+    wrong = pcii.check_grid(pcii.import_lens_array(path, mistaken, optics), (15, 100))
     assert wrong.order == ViewOrder(flip_rows=True, flip_cols=True)
 
 
@@ -149,7 +138,7 @@ def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
     write(tmp_path / "ramp.exr", ramp)
     lenses = LensArray(rows=1, cols=5, pitch_px=(20.3, 20.0), offset_px=(1.5, 0))
     optics = Optics(pitch_mm=(1, 1), focal_mm=1, sensor_mm=105)
-    views = import_lens_array(tmp_path / "ramp.exr", lenses, optics)
+    views = pcii.import_lens_array(tmp_path / "ramp.exr", lenses, optics)
     assert views.radiance.shape == (1, 5, 20, 20, 1)
     assert views.grid.pixel_mm == 1.0
     for l in range(5):
@@ -160,10 +149,10 @@ def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
 def test_a_mosaic_that_cutting_would_break_is_refused(tmp_path: Path) -> None:
     write(tmp_path / "few.png", numbers(0, 0, channels=1))
     even = LensArray(rows=1, cols=2, pitch_px=(4, 4))
-    assert import_lens_array(tmp_path / "few.png", even, OPTICS, cfa="GRBG").cfa == "GRBG"
+    assert pcii.import_lens_array(tmp_path / "few.png", even, OPTICS, cfa="GRBG").cfa == "GRBG"
     for wrong in (replace(even, pitch_px=(3, 4)), replace(even, inverted=True)):
         with pytest.raises(InputError, match="is a mosaic"):
-            import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
+            pcii.import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
 
 
 GREY = np.random.default_rng(1).integers(0, 65536, (H, W)).astype(np.uint16)
@@ -178,7 +167,7 @@ def test_a_gamma_that_is_not_used_is_named(tmp_path: Path, value: float, unused:
     (tmp_path / "0_0.png").write_bytes(png_file(W, H, 8, 0, pixels, gamma))
     (tmp_path / "._0_0.png").write_bytes(b"\0\5\x16\7")  # what macOS leaves beside files
     notes: list[str] = []
-    views = import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", note=notes.append)
+    views = pcii.import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", note=notes.append)
     np.testing.assert_allclose(views.view(0, 0)[..., 0], (GREY >> 8) / 255, rtol=1e-6)
     assert notes == unused
 
@@ -221,7 +210,7 @@ def write_counts(folder: Path, kind: str) -> str:
 
 @pytest.mark.parametrize("kind", ["plain", "ImageJ", "shaped", "appended", ">u2", "int16", "OME set"])
 def test_frames_of_tiff_files_are_added_up(tmp_path: Path, kind: str) -> None:
-    counts = import_counts(tmp_path, OPTICS, pattern=write_counts(tmp_path, kind))
+    counts = pcii.import_counts(tmp_path, OPTICS, pattern=write_counts(tmp_path, kind))
     np.testing.assert_array_equal(counts.dense, COUNTS.sum(axis=2))
     assert counts.readout.frames == 5
 
@@ -232,15 +221,15 @@ def test_frames_of_tiff_files_are_added_up(tmp_path: Path, kind: str) -> None:
 def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> None:
     np.save(tmp_path / "all.npy", array)
     for source in (array, tmp_path / "all.npy"):
-        counts = import_counts(source, OPTICS, cfa="GRBG")
+        counts = pcii.import_counts(source, OPTICS, cfa="GRBG")
         np.testing.assert_array_equal(counts.dense, array.sum(axis=2))
         assert (counts.cfa, counts.readout.frames) == ("GRBG", 5)
         assert (counts.frame is not None) == (array is BITS)  # of one bit the frame of each count is kept
     np.save(tmp_path / "0_0.npy", array[0, 0, 0])  # one frame without an axis of frames
-    single = import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", note=[].append)
+    single = pcii.import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", note=[].append)
     np.testing.assert_array_equal(single.view(0, 0), array[0, 0, 0])
     with pytest.raises(InputError, match="--counts for photons; got int64"):
-        import_arrays(COUNTS, OPTICS)
+        pcii.import_arrays(COUNTS, OPTICS)
 
 
 @pytest.mark.parametrize(
@@ -252,7 +241,7 @@ def test_pictures_that_do_not_keep_counts_are_refused(tmp_path: Path, ending: st
     signed: dict[str, Any] = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
     tifffile.imwrite(tmp_path / "0_0.tif", (COUNTS[0, 0] + 32768).astype(np.uint16), **signed)
     with pytest.raises(InputError, match=words):
-        import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", note=[].append)
+        pcii.import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", note=[].append)
 
 
 def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
@@ -265,7 +254,7 @@ def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
     (root / "valid.png").write_bytes(b"")
     notes: list[str] = []
-    scene = import_hci(root, note=notes.append)
+    scene = pcii.import_hci(root, note=notes.append)
     assert scene.views.grid.focal_mm == 100
     assert notes[1:] == ["not used: valid.png", "not used of parameters.cfg: authors"]
     assert scene.truth is not None

@@ -51,13 +51,15 @@ def test_nothing_is_in_focus_where_nothing_is(two_squares, method):
 
 
 @methods
-def test_sparse_and_dense_counts_give_the_same_masks_and_a_plane_may_be_requested_twice(method):
+def test_sparse_and_dense_counts_give_the_same_masks(method):
     counts = sample().counts
     dense = PhotonCounts.from_dense(counts.dense, counts.grid, cfa=counts.cfa)
     assert counts.is_sparse != dense.is_sparse
-    one, twice = (segment(*args, method=method) for args in ((counts, [540, 620]), (dense, [540, 620, 540])))
-    np.testing.assert_array_equal(twice.in_focus[:2], one.in_focus)
-    np.testing.assert_array_equal(twice.in_focus[2], one.in_focus[0])
+    one, other = (segment(each, [540, 620], method=method).in_focus for each in (counts, dense))
+    np.testing.assert_array_equal(one, other)
+    if method == "posterior":  # a plane may be requested twice
+        twice = segment(counts, [540, 620, 540], method=method).in_focus
+        np.testing.assert_array_equal(twice, one[[0, 1, 0]])
 
 
 @methods
@@ -74,7 +76,7 @@ def test_one_view_and_an_unknown_method_are_refused(method):
     with pytest.raises(InputError, match=r"^counts: one view has no depth"):
         segment(counts, 1.0, method=method)
     with pytest.raises(InputError, match=rf"^method: .*'magic'.*{method}"):
-        segment(counts, 1.0, method="magic")
+        segment(sample().counts, 540, method="magic")
 
 
 @pytest.mark.parametrize("share", [0.5, 0.1])
@@ -227,7 +229,7 @@ def counts() -> PhotonCounts:
 def test_methods_of_another_package_are_found_by_name_and_imported_when_they_are_used(tmp_path, monkeypatch):
     assert removal_methods() == tuple(METHODS)
     install(tmp_path, monkeypatch, good="strange_code:good", broken="no_such_module:remove")
-    assert removal_methods() == (*METHODS, "good", "broken")
+    assert removal_methods() == (*METHODS, "broken", "good")
     focus = segment(counts(), [1.0, 2.0], method="good")
     np.testing.assert_array_equal(focus.in_focus, focus.sections.counts[..., 0] > 0)
     words = r"^method: 'broken' of the package strange cannot be loaded: .*no_such"
