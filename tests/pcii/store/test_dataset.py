@@ -214,6 +214,8 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC0", "citation": "Me", "origin": "a camera"}
     depths: dict[str, Any] = {"z_mm": [540, 620], "z_range_mm": (450, 750), "photon_budget": 10}
     saved = save_dataset(tmp_path / "d", images, SAVED_TRUTH, **depths, **texts)
+    with pytest.raises(InputError, match="holds something else"):
+        save_dataset(tmp_path / "d", images)
     dataset = open_dataset(tmp_path / "d")
     assert dataset.manifest == saved.manifest
     assert (dataset.grid, dataset.cfa, dataset.light.photons) == (GRID, "GRBG", 10)

@@ -144,6 +144,16 @@ def test_a_document_that_is_missing_or_of_others_is_refused(kind: Any, tmp_path:
         assert "damaged" in one_sentence(lambda: kind.read(tmp_path, model), path)
 
 
+def test_every_bit_of_the_manifest_of_a_dataset_is_guarded(tmp_path: Path) -> None:
+    DATASET_FOLDER.write(tmp_path, {"a": 1})
+    path = tmp_path / DATASET_FOLDER.document
+    content = path.read_bytes()
+    for bit in range(0, 8 * len(content), 7):
+        flip_a_bit(path, bit)
+        one_sentence(lambda: DATASET_FOLDER.read(tmp_path, DatasetManifest), path)
+        path.write_bytes(content)
+
+
 def test_files_are_listed_with_their_sizes_and_hashes(tmp_path: Path) -> None:
     write_bytes_safely(tmp_path / "b" / "c.bin", b"abc")
     write_bytes_safely(tmp_path / "a.bin", b"")
