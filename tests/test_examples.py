@@ -20,9 +20,7 @@ pytestmark = [pytest.mark.guide, pytest.mark.renders]
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda file: file.stem)
-def test_an_example_runs(
-    example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(example)])
     with mpl.rc_context({"backend": "agg"}):
@@ -30,9 +28,7 @@ def test_an_example_runs(
     assert len(capsys.readouterr().out.splitlines()) >= 2
 
 
-def test_the_first_lines_of_the_readme_print_what_stands_below_them(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_first_lines_of_the_readme_print_what_stands_below_them(capsys) -> None:
     code, text = (
         next(block.text for block in blocks(ROOT / "README.md") if block.language == language)
         for language in ("python", "text")

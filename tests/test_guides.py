@@ -1,4 +1,4 @@
-"""The pages do what they say: their Python and their `sh` blocks run, from top to bottom."""
+"""The pages do what they say: their blocks run, and what they name exists."""
 
 import re
 import shutil
@@ -12,7 +12,8 @@ from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
-from guide_blocks import PAGES, ROOT, blocks, run_page
+from cyclopts import CycloptsError
+from guide_blocks import APPS, PAGES, ROOT, SHELL_SIGNS, blocks, run_page, words
 from make_your_own_images import photograph
 from pydantic import BaseModel
 from tiny import TINY_RECIPE
@@ -159,9 +160,7 @@ def case(name: str) -> object:
 
 @pytest.mark.guide
 @pytest.mark.parametrize("name", [case(name) for name in RUN])
-def test_a_page_runs(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
+def test_a_page_runs(name: str, tmp_path: Path, monkeypatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.chdir(tmp_path)
     if name != "first_hour.md":  # which begins in an empty folder
         copy_sample(Path("out/sample"))
@@ -220,7 +219,76 @@ def test_the_terms_of_the_guide_to_exchange_are_valid() -> None:
 def test_sentences_that_the_guide_explains_are_said() -> None:
     text = (DOCS / "what_to_do.md").read_text()
     sources = [file.read_text() for room in ("pcii", "simgen") for file in (ROOT / room).rglob("*.py")]
-    said = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))  # sentences that go on in the next line
+    text_of_sources = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))  # sentences that go on in the next line
     sentences = re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
     assert len(sentences) > 12
-    assert [sentence for sentence in sentences if sentence not in said] == []
+    assert [sentence for sentence in sentences if sentence not in text_of_sources] == []
+
+
+INLINE = re.compile(r"(?<!`)`((?:simgen|pcii) [^`]+)`(?!`)")
+LINK = re.compile(r"\]\((?!https?://)([^)#\s]+)")
+COMMON = {"--help"}
+"""Options that every command has, and that its own parser does not know."""
+by_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.name))
+
+
+def commands(line: str) -> Iterator[list[str]]:
+    """The commands of a line, of which `simgen` and `pcii` alone are given, without the shell's signs."""
+    part: list[str] = []
+    for word in [*words(line), ";"]:
+        if set(word) <= SHELL_SIGNS:
+            if part:
+                yield part
+            part = []
+        else:
+            part.append(word.removeprefix(".venv/bin/"))
+
+
+@by_page
+def test_commands_of_blocks_are_understood(page: Path) -> None:
+    for block in blocks(page):
+        for line in block.commands():
+            if not re.match(r"(\.venv/bin/)?(simgen|pcii) ", line):
+                continue
+            for program, *arguments in commands(line):
+                if program in APPS:
+                    known = [word for word in arguments if word not in COMMON]
+                    try:
+                        APPS[program].parse_args(known, exit_on_error=False, print_error=False)
+                    except CycloptsError as fault:
+                        pytest.fail(f"{page.name}: {line.strip()}: {fault}")
+
+
+@by_page
+def test_commands_and_options_of_sentences_exist(page: Path) -> None:
+    for text in INLINE.findall(page.read_text(encoding="utf-8")):
+        program, command, *rest = text.split()
+        app = APPS[program]
+        if command.startswith("-"):
+            continue
+        assert command in app, f"{page.name}: {text}"
+        parser = app[command]
+        if parser.default_command is None and rest:  # a group of commands, such as `simgen benchmark make`
+            assert rest[0] in parser, f"{page.name}: {text}"
+            parser = parser[rest.pop(0)]
+        options = [] if parser.default_command is None else parser.assemble_argument_collection()
+        known = {name for each in options for name in each.names} | COMMON
+        for word in rest:
+            if re.match(r"--?[a-z]", word):
+                assert word.split("=")[0] in known, f"{page.name}: {text}"
+
+
+@by_page
+def test_tables_are_toml(page: Path) -> None:
+    for block in blocks(page):
+        if block.language == "toml":
+            keys = re.findall(r"^(\w+) = ", block.text, re.MULTILINE)
+            alternatives = len(keys) > 1 == len({*keys})
+            for table in block.text.splitlines() if alternatives else [block.text]:
+                tomllib.loads(table)
+
+
+@by_page
+def test_links_lead_to_files(page: Path) -> None:
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), f"{page.name}: {target}"

@@ -91,16 +91,16 @@ def rows() -> Iterator[Any]:
 
 @pytest.mark.parametrize(("call", "answers"), list(rows()))
 def test_a_call_gives_what_the_page_says(call: str, answers: dict[str, str]) -> None:
-    found = {title: [answer_of(call, **own) for own in COLUMNS[title]] for title in answers}
+    found = {title: [answer_of(call, **inputs) for inputs in COLUMNS[title]] for title in answers}
     assert {title: " or ".join(dict.fromkeys(each)) for title, each in found.items()} == answers
 
 
-def answer_of(call: str, **own: Any) -> str:
+def answer_of(call: str, **inputs: Any) -> str:
     """Whether a call gives finite numbers, NaN or infinity among them, or an error that names an argument."""
     with TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            arrays = list(numbers_in(eval(call, inputs_of(call, Path(folder), **own))))
+            arrays = list(numbers_in(eval(call, inputs_of(call, Path(folder), **inputs))))
         except pcii.InputError as fault:
             return "refused" if re.match(r"[^:]+: .", str(fault)) else f"refused without a name: {fault}"
     return "value" if all(np.isfinite(array).all() for array in arrays) else "NaN"

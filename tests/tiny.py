@@ -26,10 +26,3 @@ pixel_mm = 1.0
 height = 32
 width = 36
 """
-
-
-def with_radiance(seeds: int) -> str:
-    """A recipe of so many seeds, as TOML, with photons and radiance."""
-    head = f'scene = "plain_pair"\nseed = {{ range = [0, {seeds}] }}\n'
-    rendered = '[render]\nsamples_per_pixel = 2\n[products]\nradiance = "mosaic"\n'
-    return f"{head}{GRID_2_X_3}[photons]\nbudget = 200\n{rendered}"

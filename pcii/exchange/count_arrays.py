@@ -163,7 +163,7 @@ class _Sum:
         if self.bits is None and not self.is_above_one:
             samples = self.sums.size * self.frames
             dark = 1 - self.number / samples
-            # Poisson counts of the same light would have at least so many numbers above 1.
+            # Poisson counts of the same light would have at least this many numbers above 1.
             expected = samples * (1 - dark * (1 - np.log(dark)) if dark > 0 else 1.0)
             if expected > SURE_NATS:
                 note(
@@ -206,6 +206,8 @@ def _warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: N
         advice += f", or --bits {bits} if they are saturated" if bits <= MOST_BITS else ""
         note(f"warning: {marks} numbers of {name} are {most}: {advice}")
         stored = stored[stored != most]
+    else:
+        _warn_of_full_frames(name, stored, note)
     if np.count_nonzero(stored) < MIN_JUDGED:
         return
     if stored.dtype == np.uint8:
@@ -222,6 +224,24 @@ def _warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: N
             f"warning: no number of {name} is below {least:g}, and they scatter about {median:g} by "
             f"{median - low:g}, where photon counts would by {np.sqrt(median):.2g}: subtract what the camera "
             "reads without light with --offset, and divide by what a photon adds with --gain"
+        )
+
+
+def _warn_of_full_frames(name: str, stored: np.ndarray, note: Note) -> None:
+    """Warn of numbers that pile up at the largest that some bits hold: pixels stop counting there.
+
+    Where N_k numbers are k, photon counts of whatever light have N_k^2 k / (N_(k - 1) (k + 1)) of k + 1 or
+    more: the moments of its rates are log-convex.
+    """
+    top = int(stored.max(initial=0))
+    if top < 3 or top & (top + 1):
+        return
+    full, next_to_it = (int(np.count_nonzero(stored == value)) for value in (top, top - 1))
+    expected_above = full**2 * top / (max(1, next_to_it) * (top + 1))
+    if expected_above > SURE_NATS:
+        note(
+            f"warning: {full / stored.size:.2g} of the numbers of {name} are {top} and none is above, where "
+            f"{expected_above:.2g} would by chance: if frames are full there, give --bits {top.bit_length()}"
         )
 
 

@@ -1,13 +1,10 @@
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, patch_views, square_mask, unit_grid
 
 from pcii.types import CameraGrid, PhotonCounts
-
-if TYPE_CHECKING:
-    from report_outcomes import Written
 
 
 class TwoSquares(NamedTuple):
@@ -39,26 +36,3 @@ def two_squares() -> TwoSquares:
     first, second = (square_mask(grid, corner, corner, SIDE_PX) for corner in CORNERS_PX)
     z_mm = (1 / DISPARITIES_PX[0], 1 / DISPARITIES_PX[1])
     return TwoSquares(grid, dense, counts, z_mm, (first, second))
-
-
-@pytest.fixture(scope="session")
-def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, "Written"]:
-    """Reports with everything, of counts alone, and of light alone; where nothing is true.
-
-    They are written once for each worker.
-    """
-    # Imported here, since a report takes most of this package and few tests want one.
-    from report_outcomes import COUNTS, LIGHT, TRUTH, Written, outcome_of
-
-    from pcii.app import write_report
-
-    found: dict[str, Written] = {}
-    for name, images, truth in (
-        ("full", (COUNTS, LIGHT), TRUTH),
-        ("counts", COUNTS, None),
-        ("light", LIGHT, None),
-    ):
-        folder = tmp_path_factory.mktemp(name)
-        found[name] = Written(outcome_of(folder / "d", images, truth), folder / "report.html")
-        write_report(found[name].path, found[name].outcome)
-    return found

@@ -25,8 +25,8 @@ def install_package(
     needs = f"Requires-Dist: {requires}\n" if requires else ""
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: strange\nVersion: {version}\n{needs}")
     groups = (
-        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in own.items())
-        for group, own in points.items()
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in values.items())
+        for group, values in points.items()
     )
     (about / "entry_points.txt").write_text("\n".join(groups))
     for name, content in files.items():

@@ -9,7 +9,7 @@ from twins import even_light
 
 from pcii.depth import estimate_depth
 from pcii.metrics import score
-from pcii.removal import segment
+from pcii.removal import METHODS, segment
 from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 
 Z_MM, RANGE_MM = (150.0, 250.0), (100.0, 400.0)  # 18 to 4.5 px of disparity: with 5 x 5 views a film wide
@@ -114,8 +114,8 @@ def test_what_shows_no_depth_is_not_answered(kind, budget):
 @pytest.mark.parametrize(
     ("size", "count", "cfa"),
     mostly_slow(
-        itertools.product([(1, 1), (1, 9), (20, 24)], [1, 2**40], ["GRBG", None]),
-        quick=[((1, 1), 2**40, None), ((1, 9), 1, "GRBG"), ((20, 24), 2**40, "GRBG")],
+        itertools.product([(1, 1), (1, 9), (40, 44)], [1, 2**40], ["GRBG", None]),
+        quick=[((1, 1), 2**40, None), ((1, 9), 1, "GRBG"), ((40, 44), 2**40, "GRBG")],
     ),
 )
 def test_saturated_counters_tell_nothing_and_can_be_scored(count, size, cfa):
@@ -123,7 +123,8 @@ def test_saturated_counters_tell_nothing_and_can_be_scored(count, size, cfa):
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa=cfa)
     depth = estimate_depth(counts, RANGE_MM)
     assert np.isnan(depth.z_mm).all()
-    focus = [segment(counts, Z_MM, method=method) for method in ("three-step", "posterior", "brightness")]
+    # Roundings of the root of a large count are too small a range for a histogram.
+    focus = [segment(counts, Z_MM, method=method) for method in METHODS]
     assert not any(one.in_focus.any() for one in focus)
     truth = Truth(np.full(size, np.inf), np.zeros(size, np.int16), {})
     assert score(focus, depth, truth).depth["coverage"] in (0, None)

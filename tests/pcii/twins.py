@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
 
@@ -17,16 +18,8 @@ def unit_grid(
     shear_px: tuple[float, float] = (0.0, 0.0),
 ) -> CameraGrid:
     """A grid whose parallax at z = 1 mm is `pitch_mm` read as pixels, exactly: focal and pixel are 1."""
-    return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=pitch_mm,
-        focal_mm=1.0,
-        pixel_mm=1.0,
-        height=height,
-        width=width,
-        shear_px=shear_px,
-    )
+    film = {"focal_mm": 1.0, "pixel_mm": 1.0, "height": height, "width": width}
+    return CameraGrid(rows=rows, cols=cols, pitch_mm=pitch_mm, shear_px=shear_px, **film)
 
 
 def paper_grid(height: int = 1024, width: int = 1024) -> CameraGrid:
@@ -63,6 +56,15 @@ def samples_of(
                 colour = channel if cfa is None else colour_of(i, j, cfa)
                 meeting.setdefault((row, col, colour), []).append(images[k, l, i, j, channel].item())
     return meeting
+
+
+def variance_of(samples: Sequence[float]) -> float:
+    """Unbiased variance by fractions, rounded once; 0 below two samples."""
+    if len(samples) < 2:
+        return 0.0
+    exact = [*map(Fraction, samples)]
+    mean = sum(exact, Fraction(0)) / len(exact)
+    return float(sum(((sample - mean) ** 2 for sample in exact), Fraction(0)) / (len(exact) - 1))
 
 
 def section_twin(
@@ -153,18 +155,9 @@ def opaque_views(surfaces: Sequence[tuple[np.ndarray, int, int, int]], grid: Cam
     """
     views = np.zeros((*grid.shape_KLHW, 3))
     for patch, top, left, disparity_px in surfaces:
-        own = patch_views(patch, top, left, disparity_px, grid)
-        views = np.where(own.any(axis=-1, keepdims=True), own, views)
+        surface = patch_views(patch, top, left, disparity_px, grid)
+        views = np.where(surface.any(axis=-1, keepdims=True), surface, views)
     return views
-
-
-def photons_of(
-    views: np.ndarray, grid: CameraGrid, per_view: float, *, seed: int, dark: float = 0.002
-) -> PhotonCounts:
-    """So many photons per view on average of views (K, L, H, W, 3) before the `dark`, behind GRBG."""
-    rates = views + dark
-    rates *= 3 * per_view * grid.view_count / rates.sum()  # a pixel sees one colour of three
-    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), grid, cfa="GRBG")
 
 
 def even_light(grid: CameraGrid, rate: float, seed: int, cfa: str | None = None) -> PhotonCounts:
@@ -175,10 +168,10 @@ def even_light(grid: CameraGrid, rate: float, seed: int, cfa: str | None = None)
 
 def bayer_photons(rates: np.ndarray, cfa: str, seed: int) -> np.ndarray:
     """Poisson counts (K, L, H, W) of colour rates (K, L, H, W, 3) behind a Bayer pattern."""
-    own = np.empty(rates.shape[:-1])
+    mosaic = np.empty(rates.shape[:-1])
     for a, b in np.ndindex(2, 2):
-        own[..., a::2, b::2] = rates[..., a::2, b::2, colour_of(a, b, cfa)]
-    return np.random.default_rng(seed).poisson(own)
+        mosaic[..., a::2, b::2] = rates[..., a::2, b::2, colour_of(a, b, cfa)]
+    return np.random.default_rng(seed).poisson(mosaic)
 
 
 def square_mask(grid: CameraGrid, top: int, left: int, size: int) -> np.ndarray:

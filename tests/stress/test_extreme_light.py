@@ -1,13 +1,15 @@
-"""Radiance of any size: black, faint, bright, too bright, no number; values are right, or refused by name."""
+"""Light and photons of any size, from none to too bright: values are right, or refused by name."""
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
-from rational_sections import samples_of, variance_of
-from twins import Reader, blocky_texture, patch_views, unit_grid
+from twins import Reader, blocky_texture, patch_views, samples_of, unit_grid, variance_of
 
 import pcii
+from pcii.sections import view_samples
+from pcii.types import LARGEST_COUNT, FocalPlanes
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)
@@ -16,11 +18,6 @@ MODES: list[dict[str, Any]] = [{}, {"variance": True}, {"subpixel": 2}]
 
 def constant(value: float, dtype: type = np.float64, channels: int = 1) -> pcii.Views:
     return pcii.Views(np.full((*GRID.shape_KLHW, channels), value, dtype), GRID)
-
-
-def all_arrays(sections: pcii.Sections) -> list[np.ndarray]:
-    made = [sections.counts, sections.estimate, sections.coverage]
-    return made if sections.variance is None else [*made, sections.variance]
 
 
 @pytest.mark.parametrize("options", MODES)
@@ -49,7 +46,7 @@ def test_a_constant_film_is_that_constant(value: float, dtype: type, options: di
     np.testing.assert_allclose(sections.estimate[reached], kept, rtol=tolerance, atol=1e-323)
     assert (sections.estimate[~reached] == 0).all()
     assert sections.variance is None or (sections.variance == 0).all()
-    assert all(np.isfinite(array).all() for array in all_arrays(sections))
+    assert all(np.isfinite(array).all() for array in (sections.counts, sections.estimate))
 
 
 @pytest.mark.parametrize("options", MODES)
@@ -86,6 +83,41 @@ def test_a_variance_just_below_the_largest_number_is_right() -> None:
         np.testing.assert_allclose(sections.variance.item(), 25 / 99 * 1e306, rtol=1e-12)
 
 
+def digits(found: float, certified: float) -> float:
+    """Number of correct decimal digits, at most 15: the logarithm of the relative error."""
+    return 15.0 if found == certified else min(15.0, -math.log10(abs(found / certified - 1)))
+
+
+@pytest.mark.parametrize(
+    ("values", "repeats", "mean", "deviation", "least"),
+    [
+        ([10000001, 10000003], 1, 10000002, 1, 11.5),
+        ([1.1, 1.3], 500, 1.2, 0.1, 11.5),
+        ([1000000.1, 1000000.3], 500, 1000000.2, 0.1, 8.5),
+        (
+            [10000000.1, 10000000.3],
+            500,
+            10000000.2,
+            0.1,
+            8.0,
+        ),  # float64 is off these by 2e-9 of the deviation
+    ],
+)
+def test_statistics_are_those_certified_for_nists_reference_data(
+    values: list[float], repeats: int, mean: float, deviation: float, least: float
+) -> None:
+    """NumAcc1 to 4: a datum is a view of one pixel. In float32 only whole numbers are those of the data."""
+    for dtype in (np.float64, np.float32)[: 1 + (repeats == 1)]:
+        light = np.array([mean, *values * repeats], dtype).reshape(1, -1, 1, 1, 1)
+        views = pcii.Views(light, unit_grid(*light.shape[:4]))
+        sections = pcii.reconstruct(views, 1e9, variance=True)
+        assert sections.variance is not None
+        single = sections.counts.dtype == np.float32  # results are rounded to it once
+        assert digits(sections.estimate.item(), mean) > (7 if single else 14)
+        found = float(np.sqrt(sections.variance, dtype=np.float64).item())
+        assert digits(found, deviation) > (7 if single else least)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("cfa", [None, "GRBG"])
 @pytest.mark.parametrize("ratio", [1e6, 1e12])
@@ -98,9 +130,10 @@ def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | 
     assert sections.variance is not None
     ulp = float(np.finfo(dtype).eps)
     for where, samples in samples_of(light, grid, 1.0, cfa=cfa).items():
-        np.testing.assert_allclose(sections.counts[0][where], float(sum(samples)), rtol=4 * ulp)
-        exact = float(variance_of(samples))
-        np.testing.assert_allclose(sections.variance[0][where], exact, rtol=8 * ulp, atol=1e-25)
+        np.testing.assert_allclose(sections.counts[0][where], math.fsum(samples), rtol=4 * ulp)
+        np.testing.assert_allclose(
+            sections.variance[0][where], variance_of(samples), rtol=8 * ulp, atol=1e-25
+        )
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -136,3 +169,73 @@ def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
     light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
     light[..., 0] = 1
     assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
+
+
+BUDGETS = [0, 1, 10**3, 10**6, 10**12]
+
+
+def film_of(budget: int, shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
+    """Exactly so many photons in each view, wherever they fall."""
+    K, L, H, W = shape
+    rng = np.random.default_rng(seed)
+    return rng.multinomial(budget, np.full(H * W, 1 / (H * W)), (K, L)).reshape(shape)
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("cfa", [None, "GRBG"])
+def test_sums_of_any_budget_are_those_of_python_integers(budget: int, cfa: str | None) -> None:
+    grid = unit_grid(2, 3, 5, 4, (1.3, 0.7))
+    film = film_of(budget, grid.shape_KLHW)
+    expected = samples_of(film[..., None], grid, 1.1, cfa=cfa)
+    where = np.nonzero(film)
+    events = pcii.PhotonCounts.from_events(*where, film[where], grid, cfa=cfa)
+    for counts in (pcii.PhotonCounts.from_dense(film, grid, cfa=cfa), events):
+        assert counts.total == budget * grid.view_count
+        sections = pcii.reconstruct(counts, 1.1)
+        assert sections.counts.sum(dtype=object) == sum(sum(each) for each in expected.values())
+        for where, samples in expected.items():
+            assert int(sections.counts[0][where]) == sum(samples)
+            assert sections.coverage[0][where] == len(samples)
+            assert sections.estimate[0][where] == sum(samples) / len(samples)
+        assert np.isfinite(sections.estimate).all()
+
+
+@pytest.mark.parametrize("count", [10**10, LARGEST_COUNT])
+def test_variances_that_64_bits_cannot_make_exactly_are_refused(count: int) -> None:
+    grid = unit_grid(2, 2, 2, 2)
+    counts = pcii.PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid)
+    with pytest.raises(pcii.InputError, match=r"^variance: the counts are too large"):
+        pcii.reconstruct(counts, 10.0, variance=True)
+
+
+def test_more_than_2_to_the_53_photons_of_a_voxel_are_counted_to_the_last() -> None:
+    """10 000 views of 2^40 - 1 photons each: double precision would miss 1808 of them."""
+    grid = unit_grid(100, 100, 1, 1)
+    counts = pcii.PhotonCounts.from_dense(np.full(grid.shape_KLHW, LARGEST_COUNT - 1), grid)
+    assert int(pcii.reconstruct(counts, 1e6).counts[0, 0, 0, 0]) == 10_000 * (LARGEST_COUNT - 1)
+
+
+def test_a_pixel_holds_2_to_the_40_photons_however_they_come() -> None:
+    grid, zero = unit_grid(1, 1, 1, 1), np.zeros(2, int)
+    most = pcii.PhotonCounts.from_events(zero, zero, zero, zero, np.array([LARGEST_COUNT - 1, 1]), grid)
+    assert most.total == LARGEST_COUNT
+    with pytest.raises(pcii.InputError, match=r"^n: more than 2\^40 photons in a pixel"):
+        pcii.PhotonCounts.from_events(zero, zero, zero, zero, np.array([LARGEST_COUNT, 1]), grid)
+    with pytest.raises(pcii.InputError, match=r"^counts: more than 2\^40 photons in a pixel"):
+        pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), LARGEST_COUNT + 1), grid)
+
+
+@pytest.mark.parametrize("level", [10**3, 10**6, 10**9, 10**11])
+@pytest.mark.parametrize("differing", [False, True])
+def test_the_variance_over_views_is_right_in_bright_windows(level: int, differing: bool) -> None:
+    """Squares of differences of 10^12 photons are 10^24: added up in 64 bits they would be noise."""
+    grid = unit_grid(3, 3, 4, 4)
+    film = np.random.default_rng(2).poisson(level, grid.shape_KLHW)
+    if differing:  # as where surfaces are out of focus
+        film *= np.arange(1, 10).reshape(3, 3, 1, 1)
+    counts = pcii.PhotonCounts.from_dense(film, grid)
+    found = view_samples(counts, FocalPlanes.at_depths(grid, 1e6), 0, cell_px=4, window_cells=1)
+    samples = [int(total) for total in film.sum(axis=(2, 3)).ravel()]
+    assert found.number.item() == 9
+    np.testing.assert_allclose(found.mean.item(), np.mean(samples), rtol=4e-16)
+    np.testing.assert_allclose(found.variance.item(), variance_of(samples), rtol=1e-14)

@@ -68,21 +68,20 @@ def test_each_piece_is_done_once_and_each_process_keeps_its_copy(tmp_path: Path,
     assert {threads for _, _, threads in results.values()} == {share}
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_fault_of_a_piece_ends_the_work(tmp_path: Path, workers: int) -> None:
-    work = Numbers(tmp_path, wrong=3)
-    with pytest.raises(InputError, match="piece 3 is wrong"):
+@pytest.mark.parametrize(
+    ("workers", "fault", "sentence"),
+    [
+        (1, "wrong", "piece 3 is wrong"),
+        (2, "wrong", "piece 3 is wrong"),
+        (2, "deadly", "a worker process died.*; what is finished stays"),
+    ],
+)
+def test_a_fault_or_a_death_ends_the_work(tmp_path: Path, workers: int, fault: str, sentence: str) -> None:
+    work = Numbers(tmp_path, **{fault: 3})
+    with pytest.raises(InputError if fault == "wrong" else WorkerLostError, match=sentence):
         list(Executor(workers).run(work, range(100)))
     assert len(work.begun()) < 20
     assert not alive({process for _, process in work.begun()} - {os.getpid()})
-
-
-def test_a_process_that_dies_ends_the_work_in_one_sentence(tmp_path: Path) -> None:
-    work = Numbers(tmp_path, deadly=3)
-    with pytest.raises(WorkerLostError, match=r"a worker process died.*; what is finished stays"):
-        list(Executor(2).run(work, range(100)))
-    assert len(work.begun()) < 20
-    assert not alive({process for _, process in work.begun()})
 
 
 COMMAND = """
@@ -157,7 +156,7 @@ def test_ctrl_c_and_a_kill_end_all_processes_in_the_midst_of_pieces(
     wait_for(lambda: not alive(workers), 10)
 
 
-def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_told_in_one_line(
+def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_is_one_line(
     started: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
     pytest.importorskip("distributed")

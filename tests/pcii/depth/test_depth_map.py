@@ -1,38 +1,21 @@
+"""Depth maps of every method: right where something is seen, without an answer elsewhere, or refused."""
+
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
 import pytest
-from twins import bayer_photons, blocky_texture, opaque_views, patch_views, photons_of, unit_grid
+from twins import bayer_photons, blocky_texture, opaque_views, patch_views, unit_grid
 
+import pcii
 from pcii.base import InputError
-from pcii.depth import NetworkInputs, PosteriorDepth, SheetModel, estimate_depth, run_network
+from pcii.depth import NetworkInputs, PosteriorDepth, SheetModel, depth_methods, estimate_depth, run_network
 from pcii.evidence import without_hot_pixels
 from pcii.removal import segment
 from pcii.store import sample
-from pcii.types import CameraGrid, DepthMap, FocalPlanes, PhotonCounts
+from pcii.types import CameraGrid, DepthMap, FocalPlanes, PhotonCounts, Views
 
 RANGE_MM = (1 / 9, 1 / 1)
-
-
-@pytest.fixture(scope="module")
-def depth(two_squares) -> DepthMap:
-    return estimate_depth(two_squares.counts, RANGE_MM)
-
-
-def disparity_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
-    """Errors in px of total disparity over one square; infinite where the method abstains."""
-    z = depth.z_mm[scene.masks[plane]]
-    errors = np.abs(6 / z - 6 / scene.z_mm[plane])  # six steps between seven cameras, each of 1 / z px
-    return np.where(np.isnan(errors), np.inf, errors)
-
-
-@pytest.mark.parametrize("plane", [0, 1])
-def test_depths_of_the_squares_are_right(depth, two_squares, plane):
-    errors = disparity_errors_px(depth, two_squares, plane)
-    # Planes are 2 px of total disparity apart, and the parabola between them finds a quarter of that; nine
-    # tenths are at the nearest plane or the next, the rest of the outline may be mixed with the dark.
-    assert np.median(errors) < 0.5
-    assert (errors < 2.0).mean() > 0.9
 
 
 @pytest.mark.parametrize("photons_per_view", [1e3, 1e5])
@@ -52,7 +35,8 @@ def test_things_of_eighteen_pixels_have_a_depth_however_much_light_there_is(phot
         assert np.nanmedian(np.abs(4 / z_mm - 4 * disparity)) < 0.5  # four steps between five cameras
 
 
-def test_the_dark_has_no_depth(depth, two_squares):
+def test_the_dark_has_no_depth(two_squares):
+    depth = estimate_depth(two_squares.counts, RANGE_MM)
     # No photon of a plane in the range comes within 8 px, the deviation of the window, of this corner.
     corner = (slice(0, 24), slice(-24, None))
     assert np.isnan(depth.z_mm[corner]).all()
@@ -116,7 +100,9 @@ def test_what_is_beyond_the_ends_of_the_range_has_no_answer_and_belongs_to_no_ma
     # Total disparities of 10 px at the left to 44 px; the range is 20 to 32 px.
     counts, total_px = slanted_card(grid, near=44 / 6, far=10 / 6, seed=0), np.linspace(10, 44, 160)
     z_range_mm = (6 / 32, 6 / 20)
-    is_answered = np.isfinite(estimate_depth(counts, z_range_mm).z_mm).mean(axis=0)
+    z_mm = estimate_depth(counts, z_range_mm).z_mm
+    assert z_range_mm[0] <= np.nanmin(z_mm) <= np.nanmax(z_mm) <= z_range_mm[1]
+    is_answered = np.isfinite(z_mm).mean(axis=0)
     assert is_answered[(total_px > 22) & (total_px < 30)].mean() > 0.9
     assert is_answered[(total_px < 18) | (total_px > 34)].mean() < 0.05
     masks = segment(counts, z_range_mm, z_range_mm=z_range_mm).in_focus.any(axis=0).mean(axis=0)
@@ -143,18 +129,6 @@ def test_plain_light_around_a_thing_is_not_sure_of_its_depth() -> None:
     assert depth.confidence[is_plain].mean() < 0.1
 
 
-def test_a_range_without_the_object_still_answers_inside_the_range():
-    near, far = 450, 580  # the bird is at 620 mm
-    z = estimate_depth(sample().counts, (near, far)).z_mm
-    assert near <= np.nanmin(z) <= np.nanmax(z) <= far
-
-
-def test_one_photon_has_no_depth():
-    grid = unit_grid(3, 3, 64, 64)
-    one = PhotonCounts.from_events(*np.array([[0, 2, 30, 30, 1]]).T, grid, cfa="GRBG")
-    assert np.isnan(estimate_depth(one, (0.2, 1.0)).z_mm).all()
-
-
 @pytest.mark.parametrize("bad", [(0, 1), (1.0, 1.0), (1, float("inf")), (1.0, 2.0, 3.0), ("near", "far")])
 def test_a_range_that_is_not_near_to_far_is_refused(bad: Any) -> None:
     grid = unit_grid(2, 2, 4, 4)
@@ -170,7 +144,9 @@ def test_a_line_of_cameras_has_depths_of_shaded_things_and_none_of_shaded_light(
     grid = unit_grid(rows, cols, 192, 192)
     y, x = np.mgrid[-1:1:64j, -1:1:64j]
     disc = (1 - x**2 - y**2).clip(min=0)[..., None] * np.ones(3)
-    counts = photons_of(opaque_views([(disc, 64, 64, 4)], grid), grid, 20000, seed=1)
+    rates = opaque_views([(disc, 64, 64, 4)], grid) + 0.002
+    rates *= 3 * 20000 * grid.view_count / rates.sum()  # a pixel sees one colour of three
+    counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=1), grid, cfa="GRBG")
     error_px = np.abs(8 / estimate_depth(counts, (1 / 6, 1 / 2)).z_mm[74:118, 74:118] - 8 * 4)
     assert (error_px <= 3).mean() > 0.7  # .99 and .85; none where regions are compared by blur
     shading = 1 + 0.5 * np.sin(np.arange(192) / 30)
@@ -179,14 +155,10 @@ def test_a_line_of_cameras_has_depths_of_shaded_things_and_none_of_shaded_light(
     assert np.isnan(estimate_depth(film, (1 / 6, 1 / 2)).z_mm).all()
 
 
-def test_one_view_is_refused():
-    grid = unit_grid(1, 1, 8, 8)
-    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    with pytest.raises(InputError, match=r"^data: one view has no depth"):
-        estimate_depth(counts, (1.0, 2.0))
-
-
 def test_depths_that_are_too_many_or_seen_by_one_camera_are_refused():
+    one_view = PhotonCounts.from_dense(np.ones((1, 1, 8, 8), dtype=int), unit_grid(1, 1, 8, 8))
+    with pytest.raises(InputError, match=r"^data: one view has no depth"):
+        estimate_depth(one_view, (1.0, 2.0))
     counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
     with pytest.raises(InputError, match=r"z_range_mm: .* choose a farther near end"):
         estimate_depth(counts, (1e-6, 1.0))
@@ -236,14 +208,156 @@ def test_a_film_larger_than_those_of_training_is_seen_in_blocks_of_two_sizes() -
     for name in ("probability", "no_surface", "in_focus"):
         one, other = (getattr(each, name) for each in (fine, coarse))
         down, right = (
-            np.stack(
-                [
-                    np.interp((np.arange(size) - 0.5) / 2, np.arange(len(row)), row)
-                    for row in np.eye(-(-size // 2))
-                ]
-            )
-            for size in one.shape[-2:]
+            np.array([np.interp((np.arange(size) - 0.5) / 2, np.arange(len(row)), row) for row in rows])
+            for size, rows in ((size, np.eye(-(-size // 2))) for size in one.shape[-2:])
         )
         linear = np.einsum("ri,...rc,cj->...ij", down, other, right)
         np.testing.assert_allclose(getattr(both, name), (one + linear) / 2, atol=1e-5)
     np.testing.assert_allclose(coarse.probability.sum(axis=0), 1 - coarse.no_surface, atol=1e-5)
+
+
+WALL_RANGE_MM = (1 / 5.9, 1 / 3.1)
+TRUE_PX = 4.3
+"""Disparity of the wall per px of pitch, between the planes of every method."""
+METHODS = [
+    ("posterior", "counts", 0.35),
+    ("sweep-17", "counts", 0.35),
+    ("variance-sweep", "counts", 0.35),
+    # Whole shifts of radiance are up to half a pixel off.
+    ("posterior", "views", 0.5),
+    ("variance-sweep", "views", 0.35),
+    # Bilinear shifts change the slope of a line by some percent of a pixel per camera.
+    ("structure-tensor", "views", 0.35),
+]
+
+
+def wall_views(grid: CameraGrid, disparity_px: tuple[float, float]) -> np.ndarray:
+    """Radiance (K, L, H, W, 1) of a wall of fine waves, which are known between the pixels too."""
+    rng = np.random.default_rng(3)
+    frequency = rng.uniform(0.05, 0.9, 40)
+    angle, phase = rng.uniform(0, 2 * np.pi, (2, 40))
+    i, j = np.indices((grid.height, grid.width)).astype(float)
+    views = np.empty((*grid.shape_KLHW, 1))
+    for k, l in np.ndindex(grid.rows, grid.cols):
+        down = i + (k - (grid.rows - 1) / 2) * disparity_px[1]
+        right = j + (l - (grid.cols - 1) / 2) * disparity_px[0]
+        waves = np.cos(
+            frequency * (np.cos(angle) * right[..., None] + np.sin(angle) * down[..., None]) + phase
+        )
+        views[k, l, ..., 0] = 1 + waves.mean(axis=-1) * 2
+    return np.maximum(views, 0.05)
+
+
+def data_of(kind: str, grid: CameraGrid, views: np.ndarray) -> PhotonCounts | Views:
+    if kind == "views":
+        return Views(views, grid)
+    counts = np.random.default_rng(4).poisson(20 * views[..., 0])
+    return PhotonCounts.from_dense(counts, grid)
+
+
+@pytest.mark.parametrize(("method", "kind", "most_px"), METHODS)
+def test_a_wall_is_found_where_it_is(method: str, kind: str, most_px: float) -> None:
+    grid = unit_grid(5, 7, 64, 72, pitch_mm=(1.0, 0.6))
+    seen = wall_views(grid, (TRUE_PX, 0.6 * TRUE_PX))
+    depth = estimate_depth(data_of(kind, grid, seen), WALL_RANGE_MM, method=method)
+    inner = np.s_[16:-16, 16:-16]
+    error_px = np.abs(6 / depth.z_mm[inner] - 6 * TRUE_PX)
+    assert np.median(error_px) < most_px
+    # Neighbouring planes can be the same section, since shifts are whole pixels.
+    assert (error_px < 2).mean() > 0.97
+    assert ((depth.confidence > 0) == np.isfinite(depth.z_mm)).all()
+
+
+def test_depth_has_no_levels_that_whole_shifts_would_give() -> None:
+    grid = unit_grid(6, 6, 64, 64)  # of an even number of cameras all are half a pixel off at once
+    error_px = []
+    for disparity_px in np.arange(3.6, 5.6, 0.2):
+        depth = estimate_depth(Views(wall_views(grid, (disparity_px, disparity_px)), grid), WALL_RANGE_MM)
+        error_px.append(np.nanmedian(5 / depth.z_mm[16:-16, 16:-16]) - 5 * disparity_px)
+    # 0.6 px with shifts to the nearest pixel.
+    assert np.sqrt(np.mean(np.square(error_px))) < 0.4
+
+
+@pytest.mark.parametrize(("method", "kind", "most_px"), METHODS)
+def test_cameras_in_the_wrong_order_do_not_pass(method: str, kind: str, most_px: float) -> None:
+    grid = unit_grid(5, 7, 64, 72)
+    seen = wall_views(grid, (TRUE_PX, TRUE_PX))[::-1, ::-1]
+    depth = estimate_depth(data_of(kind, grid, seen), WALL_RANGE_MM, method=method)
+    error_px = np.abs(6 / depth.z_mm[16:-16, 16:-16] - 6 * TRUE_PX)
+    assert not np.median(error_px) < most_px  # or it is not answered
+
+
+@pytest.mark.parametrize("method", ["sweep-17", "variance-sweep"])
+def test_brightness_alone_is_no_depth(method: str) -> None:
+    # A mosaic whose colours differ much: where all shifts are even a voxel has samples of one colour only.
+    grid = unit_grid(5, 5, 48, 48)
+    rates = np.where(np.indices((48, 48)).sum(axis=0) % 2 == 0, 8.0, 0.5)
+    counts = np.random.default_rng(0).poisson(np.broadcast_to(rates, grid.shape_KLHW))
+    depth = estimate_depth(PhotonCounts.from_dense(counts, grid, cfa="GRBG"), (1 / 6, 1 / 2), method=method)
+    total_px = 4 / depth.z_mm
+    # 17 planes from 8 to 24 px: none has more than its share, by far.
+    chosen = np.bincount(np.rint(total_px[np.isfinite(total_px)]).astype(int) - 8, minlength=17)
+    assert chosen.max() < 0.3 * chosen.sum()
+
+
+@pytest.mark.parametrize(("method", "photons"), [*((each, 0) for each in depth_methods()), ("posterior", 1)])
+def test_where_nothing_is_seen_there_is_no_depth(method: str, photons: int) -> None:
+    grid = unit_grid(3, 3, 24, 20)
+    data = PhotonCounts.from_events(*np.array([[0, 2, 12, 10, photons]]).T, grid)
+    if method not in depth_methods(data):
+        data = Views(np.zeros((*grid.shape_KLHW, 3)), grid)
+    depth = estimate_depth(data, (0.2, 1.0), method=method)
+    assert np.isnan(depth.z_mm).all()
+    assert (depth.confidence == 0).all()
+
+
+SMALL = unit_grid(2, 2, 8, 8)
+EVEN = PhotonCounts.from_dense(np.ones(SMALL.shape_KLHW, int), SMALL)
+
+
+def halfway(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
+    """A method of another package."""
+    film = np.full((data.grid.height, data.grid.width), sum(z_range_mm) / 2)
+    return pcii.DepthMap(film, np.ones(film.shape))
+
+
+def half_a_map(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
+    depth = halfway(data, z_range_mm)
+    return pcii.DepthMap(depth.z_mm[::2], depth.confidence[::2])
+
+
+def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = [
+        EntryPoint(name, f"{__name__}:{name}", "pcii.depth_methods") for name in ("halfway", "half_a_map")
+    ]
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points", lambda group: [point for point in points if point.group == group]
+    )
+    assert "halfway" in depth_methods(EVEN)
+    assert (estimate_depth(EVEN, (0.5, 1.0), method="halfway").z_mm == 0.75).all()
+    words = r"'half_a_map' of a package must return a pcii\.DepthMap of 8 x 8"
+    with pytest.raises(pcii.InputError, match=words):
+        estimate_depth(EVEN, (0.5, 1.0), method="half_a_map")
+
+
+def answering(z_mm: float, confidence: float) -> Any:
+    def wrong(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
+        return pcii.DepthMap(np.full((8, 8), z_mm), np.full((8, 8), confidence))
+
+    return wrong
+
+
+@pytest.mark.parametrize(
+    ("photons", "method", "words"),
+    [
+        (1, "structure-tensor", "no estimator of depth from photon counts named 'structure-tensor'"),
+        (1, "nearest", "named 'nearest'; use posterior, sweep-17, variance-sweep$"),
+        (1, answering(-0.5, 1.0), "^method: 'wrong' must return depths above 0 mm, or NaN where it has no"),
+        (1, answering(0.5, np.nan), "^method: 'wrong' must return a confidence from 0 to 1, also where"),
+        (2**20 + 1, "sweep-17", r"more than 2\^40 photons"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(photons: int, method: Any, words: str) -> None:
+    counts = PhotonCounts.from_dense(photons * EVEN.dense, SMALL)
+    with pytest.raises(pcii.InputError, match=words):
+        estimate_depth(counts, (0.5, 1.0), method=method)

@@ -1,22 +1,30 @@
-"""What an evaluation measures: methods of depth, lights, bounds beside them, and what is refused."""
+"""What an evaluation measures and measures again, bounds beside it, and what is refused."""
 
+import ast
+import hashlib
+import html
+import sys
 from collections.abc import Sequence
+from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from other_packages import install_package
 from tiny_datasets import NESTED, OWN, write_dataset
 
+import pcii
 from pcii.app import commands as cli
 from pcii.app import load_estimates
 from pcii.base import InputError, command_line
 from pcii.depth import estimate_depth
-from pcii.evaluation import evaluate, named_methods, read_rows, tasks_of
+from pcii.evaluation import NamedMethod, evaluate, named_methods, read_rows, software_of, tasks_of
+from pcii.evaluation.rows import writing_rows
 from pcii.metrics import object_bounds
 from pcii.removal import removal_methods
 from pcii.sections import reconstruct
-from pcii.store import Dataset, open_dataset, save_dataset
+from pcii.store import Dataset, machine, open_dataset, own_software, save_dataset
 from pcii.types import CameraGrid, Light, PhotonCounts, Truth, Views
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
@@ -77,8 +85,8 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(tmp_
     expected = estimate_depth(LIGHT, (450, 800), method="structure-tensor")
     for number, (command, option) in enumerate([("depth", "--method"), ("run", "--depth-method")]):
         out = tmp_path / str(number)
-        asked = [command, *at_light, option, "structure-tensor", "-o", str(out)]
-        assert command_line.run(cli.app, asked) == 0
+        arguments = [command, *at_light, option, "structure-tensor", "-o", str(out)]
+        assert command_line.run(cli.app, arguments) == 0
         _, depth = load_estimates(out, both.at_light(Light.parse(FULL_LIGHT)))
         assert depth is not None
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
@@ -95,8 +103,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(tmp_
 def test_what_a_method_cannot_take_is_refused_before_any_work(
     tmp_path: Path, has: str, methods: list[str], budgets: list[Any], sentence: str
 ) -> None:
-    images = {"counts": COUNTS, "views": LIGHT, "both": (COUNTS, LIGHT)}[has]
-    data = saved(tmp_path / "alone", images)
+    data = saved(tmp_path / "alone", {"counts": COUNTS, "views": LIGHT}[has])
     with pytest.raises(InputError, match=sentence):
         evaluate([data.path], tmp_path / "out", methods=methods, budgets=budgets)
     assert not (tmp_path / "out").exists()
@@ -124,3 +131,82 @@ def test_the_bound_of_an_objects_depth_stands_beside_it_where_there_is_radiance(
         ["both", "by exposure", "depth:posterior", expected["depth_sigma_px"]]
     ]
     assert ">bound, px</th>" in (tmp_path / "out" / "evaluation.html").read_text()
+
+
+COMPUTES = ("base", "types", "sections", "evidence", "depth", "removal", "metrics")
+DRAWS_TALKS_OR_LOADS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed", "lazy-loader"}
+CODE = """
+from pcii import DepthMap, Segmented
+from pathlib import Path
+import numpy as np
+
+def remove(counts, sections):
+    threshold = float((Path(__file__).parent / "weights.txt").read_text())
+    return Segmented(sections.counts.sum(axis=-1) > threshold, "learned", sections)
+
+def map_depth(data, z_range_mm):
+    film = data.grid.height, data.grid.width
+    return DepthMap(np.full(film, z_range_mm[0]), np.ones(film))
+"""
+POINTS = {"pcii.methods": {"learned": "strange:remove"}, "pcii.depth_methods": {"near": "strange:map_depth"}}
+
+
+def test_every_package_that_computes_is_recorded() -> None:
+    imported = set[str]()
+    for room in COMPUTES:
+        for file in (Path(pcii.__file__).parent / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module)
+    roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
+    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
+    assert packages - DRAWS_TALKS_OR_LOADS <= set(own_software())
+
+
+def test_rows_of_other_software_are_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package, out = tmp_path / "package", tmp_path / "out"
+    package.mkdir()
+    data = write_dataset(tmp_path / "data", 1, {OWN: 5})
+    methods = ["brightness", "learned", "depth:near", "depth:own_method.py:map_depth"]
+    monkeypatch.chdir(tmp_path)
+
+    def made_again() -> tuple[str, ...]:
+        return evaluate([data], out, methods=methods).made_again
+
+    def install(weights: str, end: str = "") -> None:
+        files = {"strange/__init__.py": CODE, "strange/weights.txt": weights}
+        install_package(package, monkeypatch, POINTS, files)
+        Path("own_method.py").write_text(CODE + end)
+
+    install("1")
+    assert made_again() == made_again() == ()
+    before = (out / "rows.jsonl").read_bytes()
+    install("2", "\n")
+    assert {*made_again()} == {
+        "2 scores of depth:near, learned, since the source of strange has changed",
+        "1 scores of depth:map_depth, since the source of own_method.py has changed",
+    }
+    assert (out / "rows.jsonl").read_bytes().startswith(before)
+    rows = read_rows(out)
+    assert len(rows) == 4
+    assert {row["method"]: row["software"] for row in rows}["learned"] == software_of(NamedMethod("learned"))
+    assert made_again() == ()
+
+
+def test_the_page_says_what_made_it(tmp_path: Path) -> None:
+    data, out = write_dataset(tmp_path / "data", 1, {OWN: 5}), tmp_path / "out"
+    evaluate([data], out, methods=["brightness", "shape-from-focus"])
+    rows = read_rows(out)
+    earlier = tmp_path / "earlier"
+    with writing_rows(earlier) as file:
+        file.add(rows[0] | {"date": "2026-01-10", "software": {"numpy": "1.0"}})
+        file.add({name: value for name, value in rows[1].items() if name != "software"})
+    (sentence,) = evaluate([data], earlier, methods=["shape-from-focus"]).made_again
+    assert sentence == "1 scores of shape-from-focus, since what makes them is not known"
+    page = html.unescape((earlier / "evaluation.html").read_text())
+    digest = hashlib.sha256((earlier / "rows.jsonl").read_bytes()).hexdigest()
+    for text in ("2026-01-10 to 20", machine(), digest, f"{version('numpy')} (1 rows); 1.0 (1 rows)"):
+        assert text in page
+    assert "Not all rows are of the same software (numpy): name all datasets and methods again." in page

@@ -1,14 +1,19 @@
-"""Folders of small pictures in any format, whose numbers say of which view they are."""
+"""Small pictures whose numbers say of which view they are, and the command line within the tests."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import tifffile
 from PIL import Image
 from png_files import png16
 
 from pcii import Optics
+from pcii.app.commands import app
+from pcii.base import command_line
 
 OPTICS = Optics(pitch_mm=(2.0, 2.0), focal_mm=35.0, sensor_mm=36.0)
 H, W = 6, 8
@@ -53,3 +58,19 @@ def make_folder(
     for k, l in np.ndindex(rows, cols):
         write(root / f"{l}_{k}.{ending}", numbers(k, l, dtype, channels))
     return root
+
+
+def run(*arguments: object) -> int:
+    return command_line.run(app, [str(argument) for argument in arguments])
+
+
+def check_refused(
+    source: Path, out: Path, options: Sequence[object], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An import ends with exit code 2 and one sentence that has these words, and leaves nothing."""
+    capsys.readouterr()
+    assert run("import", source, "-o", out, *options) == 2
+    *_, message = capsys.readouterr().err.strip().split("\n")
+    assert message.startswith("error: ")
+    assert re.search(words, message), message
+    assert not out.exists()

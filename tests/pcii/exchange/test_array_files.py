@@ -7,8 +7,7 @@ import h5py
 import numpy as np
 import OpenEXR
 import pytest
-from command_runs import check_refused, run
-from picture_folders import OPTICS
+from picture_folders import OPTICS, check_refused, run
 from PIL import Image
 from scipy.io import savemat
 
@@ -125,9 +124,9 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     np.save(tmp_path / "views.npy", VIEWS_KLHW)
     arguments = [*CAMERAS, "--depth", tmp_path / name, *options]
     assert run("import", tmp_path / "views.npy", "-o", tmp_path / "out", *arguments) == 0
-    said = capsys.readouterr().out
-    assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in said
-    assert "24 of 480 pixels have no known depth there, and count in no score" in said
+    printed = capsys.readouterr().out
+    assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in printed
+    assert "24 of 480 pixels have no known depth there, and count in no score" in printed
     dataset = pcii.open_dataset(tmp_path / "out")
     truth = dataset.truth
     assert truth is not None
@@ -141,7 +140,7 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         [row["precision"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
         for kind in ("object", "pixel")
     )
-    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # nobody has told objects apart
+    assert (by_object, by_pixel) == ([None, None], [1.0, 1.0])  # objects have no names
     assert truth.mask_kind == "pixel"  # what reports show
     np.testing.assert_allclose(truth.z_mm[1:], z_mm[1:], rtol=1e-6)
     answer = pcii.DepthMap(np.where(z_mm == 0, 20, z_mm), np.ones(z_mm.shape))
@@ -149,6 +148,9 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     assert (errors["within_1px"], errors["ece"]) == (1.0, 0.0)
     answer = pcii.DepthMap(np.full(z_mm.shape, 90.0), np.ones(z_mm.shape))
     assert depth_errors(grid, answer, truth)["within_1px"] == 1 - 16 / (19 * 24)
+
+
+RGB = {name: np.full((20, 24), value, np.float32) for name, value in (("R", 1), ("G", 2), ("B", 3))}
 
 
 @pytest.mark.parametrize(
@@ -159,21 +161,22 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
         (np.full((20, 24), 0.04), [], "has 0.04 mm, where depths are .* correct --depth-unit-mm"),
         (np.full((20, 24), 0.04), ["--depth-key", "z"], "--depth-key is for .npz"),
         (None, ["--depth-along-ray"], "are for a file of --depth"),
+        (RGB, [], "has colours or several pages"),
+        (np.full((20, 24), 0.6), [], None),
     ],
 )
-def test_depths_that_cannot_be(tmp_path: Path, capsys: Any, z: Any, options: list[str], words: str) -> None:
-    np.save(tmp_path / "views.npy", VIEWS_KLHW)
-    if z is not None:
+def test_depths_that_cannot_be_are_refused_and_those_in_metres_named(
+    tmp_path: Path, capsys: Any, z: Any, options: list[str], words: str | None
+) -> None:
+    source, out = tmp_path / "views.npy", tmp_path / "out"
+    np.save(source, VIEWS_KLHW)
+    if z is RGB:
+        OpenEXR.File({}, RGB).write(str(tmp_path / "z.exr"))
+    elif z is not None:
         np.save(tmp_path / "z.npy", z)
-        options = [*options, "--depth", str(tmp_path / "z.npy")]
-    check_refused(tmp_path / "views.npy", tmp_path / "out", [*CAMERAS, *options], words, capsys)
-
-
-def test_a_picture_in_colours_is_no_map_of_depth(tmp_path: Path, capsys: Any) -> None:
-    np.save(tmp_path / "views.npy", VIEWS_KLHW)
-    planes = {
-        name: np.full((20, 24), value, np.float32) for name, value in zip("RGB", (1, 2, 3), strict=True)
-    }
-    OpenEXR.File({}, planes).write(str(tmp_path / "photo.exr"))
-    options = [*CAMERAS, "--depth", tmp_path / "photo.exr"]
-    check_refused(tmp_path / "views.npy", tmp_path / "out", options, "has colours or several pages", capsys)
+    options = [*CAMERAS, *options, *(f"--depth={file}" for file in tmp_path.glob("z.*"))]
+    if words:
+        check_refused(source, out, options, words, capsys)
+    else:
+        assert run("import", source, "-o", out, *options) == 0
+        assert "warning: z.npy has depths of 0.6 to 0.6 mm, nearer than the focal" in capsys.readouterr().out

@@ -1,26 +1,20 @@
 """Benchmark scenes, arrays, lens arrays and photon frames: each against a few numbers worked out by hand."""
 
+import struct
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 from picture_folders import OPTICS, H, W, numbers, write
+from PIL import Image
+from png_files import chunk, compressed, png_file
 from rendered_cards import Card, render
 
-from pcii import (
-    CameraGrid,
-    InputError,
-    LensArray,
-    Optics,
-    ViewOrder,
-    check_grid,
-    import_arrays,
-    import_hci,
-    import_images,
-    import_lens_array,
-    reconstruct,
-)
+import pcii
+from pcii import CameraGrid, InputError, LensArray, Optics, ViewOrder
 from pcii.types import disparity_px
 
 PARAMETERS = """[intrinsics]
@@ -61,7 +55,7 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
     factor = 0.025 * 100.0 * W
     disparity = (factor * 4.25 / depth_m - factor) / 4.25 / 35.0
     pfm(root / name, depth_m if "depth" in name else disparity, scale)
-    scene = import_hci(root, note=[].append)
+    scene = pcii.import_hci(root, note=[].append)
     grid = scene.views.grid
     assert (grid.rows, grid.cols, grid.pitch_mm) == (3, 3, (25.0, 25.0))
     assert scene.truth is not None
@@ -74,12 +68,12 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
 
 
 def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
-    scene = import_hci(hci_folder(tmp_path / "scene"))
+    scene = pcii.import_hci(hci_folder(tmp_path / "scene"))
     assert scene.z_range_mm is None  # 8 px are so coarse that -1.6 px would be beyond infinity
     text = PARAMETERS.format(height=512, width=512, rows=1, cols=1)
     (tmp_path / "parameters.cfg").write_text(text)
     write(tmp_path / "input_Cam000.png", np.zeros((512, 512, 3), np.uint8))
-    scene = import_hci(tmp_path)
+    scene = pcii.import_hci(tmp_path)
     assert scene.z_range_mm is not None
     near, far = (float(disparity_px(scene.views.grid, z)[0]) for z in scene.z_range_mm)
     assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
@@ -88,25 +82,22 @@ def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
 def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Path) -> None:
     root = hci_folder(tmp_path / "scene", rows=2, cols=3)
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
-    told: list[str] = []
-    scene = import_hci(root, note=told.append)
-    assert scene.truth is None
-    assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
+    notes: list[str] = []
+    assert pcii.import_hci(root, note=notes.append).truth is None
+    assert notes == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
 
 
 def test_arrays_come_in(tmp_path: Path) -> None:
     light = np.random.default_rng(1).random((2, 3, H, W, 3))
     np.save(tmp_path / "a.npy", light)
-    views = import_arrays(tmp_path / "a.npy", OPTICS)
+    views = pcii.import_arrays(tmp_path / "a.npy", OPTICS)
     np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
-    flat = light.reshape(6, H, W, 3)
-    counted = import_arrays(flat, OPTICS, grid=(2, 3))
+    counted = pcii.import_arrays(light.reshape(6, H, W, 3), OPTICS, grid=(2, 3))
     np.testing.assert_array_equal(np.asarray(counted.radiance), np.asarray(views.radiance))
-    down = import_arrays(flat, OPTICS, grid=(3, 2), order=ViewOrder(swap_axes=True))
-    np.testing.assert_allclose(down.view(2, 1), light[1, 2], rtol=1e-6)
-    swapped = import_arrays(light, OPTICS, order=ViewOrder(swap_axes=True))
-    assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
-    np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
+    for array, grid in ((light, None), (light.reshape(6, H, W, 3), (3, 2))):
+        swapped = pcii.import_arrays(array, OPTICS, grid=grid, order=ViewOrder(swap_axes=True))
+        assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
+        np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
 
 
 GRID = CameraGrid(rows=4, cols=5, pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025, height=60, width=60)
@@ -123,20 +114,20 @@ def lens_picture(path: Path, views: np.ndarray, *, inverted: bool, margin: int =
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path, inverted: bool) -> None:
+def test_a_lens_array_is_cut_apart_and_an_inverted_one_recognised(tmp_path: Path, inverted: bool) -> None:
     views = render(GRID, [Card(60, seed=1), Card(25, (0.2, 0.8, 0.2, 0.6), 2)], cell=6)
     path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
     optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)
     lenses = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=inverted)
-    found = import_lens_array(path, lenses, optics, note=pytest.fail)
+    found = pcii.import_lens_array(path, lenses, optics, note=pytest.fail)
     assert found.grid == GRID
     np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
-    assert check_grid(found, (15, 100)).order is None
-    told: list[str] = []
-    import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=told.append)
-    assert told == ["not used: room for 2 more columns and 1 more rows of lens images"]
+    assert pcii.check_grid(found, (15, 100)).order is None
+    notes: list[str] = []
+    pcii.import_lens_array(path, replace(lenses, rows=3, cols=3), optics, note=notes.append)
+    assert notes == ["not used: room for 2 more columns and 1 more rows of lens images"]
     mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
-    wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))
+    wrong = pcii.check_grid(pcii.import_lens_array(path, mistaken, optics), (15, 100))
     assert wrong.order == ViewOrder(flip_rows=True, flip_cols=True)
 
 
@@ -147,7 +138,7 @@ def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
     write(tmp_path / "ramp.exr", ramp)
     lenses = LensArray(rows=1, cols=5, pitch_px=(20.3, 20.0), offset_px=(1.5, 0))
     optics = Optics(pitch_mm=(1, 1), focal_mm=1, sensor_mm=105)
-    views = import_lens_array(tmp_path / "ramp.exr", lenses, optics)
+    views = pcii.import_lens_array(tmp_path / "ramp.exr", lenses, optics)
     assert views.radiance.shape == (1, 5, 20, 20, 1)
     assert views.grid.pixel_mm == 1.0
     for l in range(5):
@@ -158,20 +149,113 @@ def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
 def test_a_mosaic_that_cutting_would_break_is_refused(tmp_path: Path) -> None:
     write(tmp_path / "few.png", numbers(0, 0, channels=1))
     even = LensArray(rows=1, cols=2, pitch_px=(4, 4))
-    assert import_lens_array(tmp_path / "few.png", even, OPTICS, cfa="GRBG").cfa == "GRBG"
+    assert pcii.import_lens_array(tmp_path / "few.png", even, OPTICS, cfa="GRBG").cfa == "GRBG"
     for wrong in (replace(even, pitch_px=(3, 4)), replace(even, inverted=True)):
         with pytest.raises(InputError, match="is a mosaic"):
-            import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
+            pcii.import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
 
 
-def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:
-    """From the pictures of a plane, through files, to a section that is the plane again."""
-    grid = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 80, height=60, width=80)
-    views = render(grid, [Card(35 * 2 / (grid.pixel_mm * 4), seed=3)], cell=6)  # 4 px from view to view
-    for k, l in np.ndindex(3, 3):
-        write(tmp_path / f"{l}_{k}.tif", views[k, l].astype(np.float32))
-    found = import_images(tmp_path, "{col}_{row}.tif", OPTICS)
-    z_mm = 35 * 2 / (grid.pixel_mm * 4)
-    section = reconstruct(found, [z_mm]).estimate[0]
-    np.testing.assert_allclose(section[8:-8, 8:-8], views[1, 1, 8:-8, 8:-8], atol=1e-5)
-    np.testing.assert_allclose(section[8:-8, 8:-8], views[0, 2, 12:-4, 4:-12], atol=1e-5)
+GREY = np.random.default_rng(1).integers(0, 65536, (H, W)).astype(np.uint16)
+BITS = np.random.default_rng(2).random((2, 2, 5, H, W)) < 0.3
+COUNTS = np.random.default_rng(3).poisson(2.0, (2, 2, 5, H, W))
+
+
+@pytest.mark.parametrize(("value", "unused"), [(0.45455, []), (1.0, ["not used: the gamma of 1 in 0_0.png"])])
+def test_a_gamma_that_is_not_used_is_named(tmp_path: Path, value: float, unused: list[str]) -> None:
+    pixels = compressed((GREY >> 8).astype(np.uint8))
+    gamma = chunk(b"gAMA", struct.pack(">I", round(1e5 * value)))
+    (tmp_path / "0_0.png").write_bytes(png_file(W, H, 8, 0, pixels, gamma))
+    (tmp_path / "._0_0.png").write_bytes(b"\0\5\x16\7")  # what macOS leaves beside files
+    notes: list[str] = []
+    views = pcii.import_images(tmp_path, "*{row}_{col}.png", OPTICS, encoding="linear", note=notes.append)
+    np.testing.assert_allclose(views.view(0, 0)[..., 0], (GREY >> 8) / 255, rtol=1e-6)
+    assert notes == unused
+
+
+def write_ome_set(folder: Path) -> None:
+    """Files of which each holds the frames of one view, and names all the others as parts of one image."""
+    names = {(k, l): f"{k}_{l}.tif" for k, l in np.ndindex(2, 2)}
+    data = "".join(
+        f'<TiffData FirstZ="{z}" FirstT="0" FirstC="0" IFD="0" PlaneCount="5"><UUID FileName="{name}">'
+        f"urn:uuid:{z:032d}</UUID></TiffData>"
+        for z, name in enumerate(names.values())
+    )
+    for z, (camera, name) in enumerate(names.items()):
+        ome = (
+            '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" '
+            f'UUID="urn:uuid:{z:032d}"><Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="XYTZC" '
+            f'Type="uint16" SizeX="{W}" SizeY="{H}" SizeT="5" SizeZ="4" SizeC="1">'
+            f'<Channel ID="Channel:0:0" SamplesPerPixel="1"/>{data}</Pixels></Image></OME>'
+        )
+        tifffile.imwrite(folder / name, COUNTS[camera].astype(np.uint16), description=ome, metadata=None)
+
+
+def write_counts(folder: Path, kind: str) -> str:
+    """Files of the frames of each view; returns the pattern of their names."""
+    if kind == "OME set":
+        write_ome_set(folder)
+        return "{row}_{col}.tif"
+    # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
+    options: dict[str, dict[str, Any]] = {
+        "ImageJ": {"imagej": True, "truncate": True},
+        "shaped": {"truncate": True},
+    }
+    options |= {"appended": {"append": True}, ">u2": {"byteorder": ">"}}
+    for k, l in np.ndindex(2, 2):
+        path, frames = folder / f"{k}_{l}.tif", COUNTS[k, l].astype("int16" if kind == "int16" else "uint16")
+        for part in np.split(frames, 5) if kind == "appended" else [frames]:
+            tifffile.imwrite(path, part, photometric="minisblack", **options.get(kind, {}))
+    return "{row}_{col}.tif"
+
+
+@pytest.mark.parametrize("kind", ["plain", "ImageJ", "shaped", "appended", ">u2", "int16", "OME set"])
+def test_frames_of_tiff_files_are_added_up(tmp_path: Path, kind: str) -> None:
+    counts = pcii.import_counts(tmp_path, OPTICS, pattern=write_counts(tmp_path, kind))
+    np.testing.assert_array_equal(counts.dense, COUNTS.sum(axis=2))
+    assert counts.readout.frames == 5
+
+
+@pytest.mark.parametrize(
+    "array", [COUNTS, COUNTS.astype(">f8"), np.asfortranarray(COUNTS), BITS], ids=range(4)
+)
+def test_frames_of_arrays_are_added_up(tmp_path: Path, array: np.ndarray) -> None:
+    np.save(tmp_path / "all.npy", array)
+    for source in (array, tmp_path / "all.npy"):
+        counts = pcii.import_counts(source, OPTICS, cfa="GRBG")
+        np.testing.assert_array_equal(counts.dense, array.sum(axis=2))
+        assert (counts.cfa, counts.readout.frames) == ("GRBG", 5)
+        assert (counts.frame is not None) == (array is BITS)  # of one bit the frame of each count is kept
+    np.save(tmp_path / "0_0.npy", array[0, 0, 0])  # one frame without an axis of frames
+    single = pcii.import_counts(tmp_path, OPTICS, pattern="{row}_{col}.npy", note=[].append)
+    np.testing.assert_array_equal(single.view(0, 0), array[0, 0, 0])
+    with pytest.raises(InputError, match="--counts for photons; got int64"):
+        pcii.import_arrays(COUNTS, OPTICS)
+
+
+@pytest.mark.parametrize(
+    ("ending", "words"),
+    [("jpg", "not a PNG, TIFF or EXR picture"), ("tif", r"a calibration of ImageJ \(c0, c1\)")],
+)
+def test_pictures_that_do_not_keep_counts_are_refused(tmp_path: Path, ending: str, words: str) -> None:
+    Image.fromarray(numbers(0, 0)[..., 0]).save(tmp_path / "0_0.jpg")
+    signed: dict[str, Any] = {"imagej": True, "metadata": {"c0": -32768.0, "c1": 1.0}}
+    tifffile.imwrite(tmp_path / "0_0.tif", (COUNTS[0, 0] + 32768).astype(np.uint16), **signed)
+    with pytest.raises(InputError, match=words):
+        pcii.import_counts(tmp_path, OPTICS, pattern=f"{{row}}_{{col}}.{ending}", note=[].append)
+
+
+def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
+    """Ends of lines, remarks, names in capitals, an author in Latin-1, a map with a scale, another file."""
+    root = hci_folder(tmp_path / "scene")
+    text = (root / "parameters.cfg").read_text().replace("= 100.0", "= 100.0 ; mm") + "authors = Jürgen\n"
+    (root / "parameters.cfg").write_bytes(text.replace("\n", "\r\n").encode("latin-1"))
+    for path in root.glob("*.png"):
+        path.rename(path.with_suffix(".PNG"))
+    pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
+    (root / "valid.png").write_bytes(b"")
+    notes: list[str] = []
+    scene = pcii.import_hci(root, note=notes.append)
+    assert scene.views.grid.focal_mm == 100
+    assert notes[1:] == ["not used: valid.png", "not used of parameters.cfg: authors"]
+    assert scene.truth is not None
+    np.testing.assert_allclose(scene.truth.z_mm, 4000)

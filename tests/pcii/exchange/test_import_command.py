@@ -1,8 +1,7 @@
-# ruff: noqa: E501
-"""`pcii import` as a new user types it, and a dozen ways to give it something wrong."""
+"""`pcii import` as a new user types it, pictures of any format, and a dozen ways to give something wrong."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from command_runs import check_refused, run
-from picture_folders import H, W, make_folder, numbers, write
-from PIL import Image
+from picture_folders import OPTICS, H, W, check_refused, make_folder, numbers, run, write
+from PIL import Image, ImageCms
 from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm
 
-from pcii import CameraGrid, open_dataset, sample
-from pcii.base import linear_to_srgb
+from pcii import CameraGrid, InputError, import_arrays, import_images, open_dataset, sample
+from pcii.base import linear_to_srgb, srgb_to_linear
 from pcii.store import verify
 
 CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
@@ -40,9 +38,9 @@ def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "mine"
     limits = ["--cfa", "GRBG", "--photons", "300", "--z-range-mm", "30", "200"]
     assert run("import", photos, "-o", out, *NAMED, *limits) == 0
-    said = capsys.readouterr().out
-    assert "3 x 3 views of 90 x 120 px, GRBG" in said
-    assert "warning" not in said
+    printed = capsys.readouterr().out
+    assert "3 x 3 views of 90 x 120 px, GRBG" in printed
+    assert "warning" not in printed
     dataset = open_dataset(out)
     assert dataset.grid == GRID
     assert dataset.cfa == "GRBG"
@@ -63,71 +61,65 @@ def test_surfaces_of_photon_counts_are_where_the_depth_map_has_them(tmp_path: Pa
     cameras = ["--pitch-mm", 13.5, 13.5, "--focal-mm", 50, "--pixel-mm", 0.1408]
     limits = ["--counts", "--cfa", "GRBG", "--z-range-mm", 450, 750]
     assert run("import", tmp_path / "counts.npy", "-o", tmp_path / "out", *cameras, *limits) == 0
-    said = capsys.readouterr().out
-    (found,) = re.findall(
-        r"the depth map has most surfaces at (.*) mm; \d+% of its depths are right to 1 px", said
-    )
+    printed = capsys.readouterr().out
+    words = r"the depth map has most surfaces at (.*) mm; \d+% of its depths are right to 1 px"
+    (found,) = re.findall(words, printed)
     depths_mm = [float(z) for z in found.split(", ")]
     assert depths_mm == pytest.approx([539, 618], abs=8)  # medians of the ball and the bird; 15 mm are 1 px
     assert open_dataset(tmp_path / "out").analysis["z_mm"] == depths_mm
-    assert "sharpest" not in said
+    assert "sharpest" not in printed
+
+
+FIT = "warning: the views fit together far better "
+NOT_MIRRORED = ["--swap-axes", "--flip-cols"]
+WRONG_PITCH = ["--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
 
 
 @pytest.mark.parametrize(
-    ("pattern", "options", "mend"),
+    ("pattern", "options", "words"),
     [
-        ("{row}_{col}.png", [], "with --swap-axes"),
-        ("{col}_{row}.png", ["--swap-axes", "--flip-cols"], "without --swap-axes --flip-cols"),
+        ("{row}_{col}.png", CAMERAS, f"{FIT}with --swap-axes;"),
+        ("{col}_{row}.png", [*CAMERAS, *NOT_MIRRORED], f"{FIT}without --swap-axes --flip-cols;"),
+        (
+            "{col}_{row}.png",
+            WRONG_PITCH,
+            "warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm",
+        ),
     ],
 )
-def test_the_option_that_mends_is_told(photos: Path, tmp_path: Path, capsys, pattern, options, mend) -> None:
-    told = ["--pattern", pattern, *CAMERAS, *options]
-    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
-    assert f"warning: the views fit together far better {mend};" in capsys.readouterr().out
-
-
-def pages(folder: Path, out: Path, places: Iterable[tuple[int, int]]) -> list[Any]:
-    """What to type for a file whose pages are the views of these places (k, l)."""
-    stack = np.stack([np.asarray(Image.open(folder / f"{l}_{k}.png")) for k, l in places])
-    tifffile.imwrite(out.with_suffix(".tif"), stack, photometric="rgb")
-    return ["import", out.with_suffix(".tif"), "-o", out, *CAMERAS]
+def test_the_option_that_mends_is_named(
+    photos: Path, tmp_path: Path, capsys, pattern, options, words
+) -> None:
+    assert run("import", photos, "-o", tmp_path / "mine", "--pattern", pattern, *options) == 0
+    assert re.search(words, capsys.readouterr().out)
 
 
 def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) -> None:
-    assert run("import", photos, "-o", tmp_path / "files", *NAMED) == 0
-    assert run(*pages(photos, tmp_path / "pages", np.ndindex(3, 3))) == 0
-    down = [(k, l) for l in range(3) for k in range(3)]
-    assert run(*pages(photos, tmp_path / "down", down), "--swap-axes", "--grid", 3, 3) == 0
-    assert "warning" not in capsys.readouterr().out
-    files, *others = (open_dataset(tmp_path / name).views for name in ("files", "pages", "down"))
-    for other in others:
-        assert files is not None
-        assert other is not None
-        np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
+    across, down = list(np.ndindex(3, 3)), [(k, l) for l in range(3) for k in range(3)]
+    for name, places, options in (("across", across, []), ("down", down, ["--swap-axes", "--grid", 3, 3])):
+        file = tmp_path / f"{name}.tif"
+        stack = np.stack([np.asarray(Image.open(photos / f"{l}_{k}.png")) for k, l in places])
+        tifffile.imwrite(file, stack, photometric="rgb")
+        assert run("import", file, "-o", tmp_path / name, *CAMERAS, *options) == 0
+        assert "warning" not in capsys.readouterr().out
+        views = open_dataset(tmp_path / name).views
+        assert views is not None
+        np.testing.assert_allclose(views.view(1, 2), srgb_to_linear(stack[places.index((1, 2))]), rtol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("shear", "words"), [(0, "--shear-px, such as (2.[5-9]|3) (2.[5-9]|3);"), (2.7, "sharpest at 6")]
 )
-def test_shifted_pictures_are_told_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
+def test_shifted_pictures_are_said_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
     """A wall at 1.6 and a card at 3.9 px per camera, of which 2.7 px were taken out."""
     shifted = replace(GRID, shear_px=(2.7, 2.7))
     views = render(shifted, [Card(150, seed=1), Card(60, (0.2, 0.8, 0.2, 0.7), 2)], cell=8)
     np.save(tmp_path / "in.npy", views.astype(np.float32))
-    told = ["--shear-px", shear, shear] if shear else []
-    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *CAMERAS, *told) == 0
-    said = capsys.readouterr().out
-    assert re.search(words, said)
-    assert ("warning: things are sharp at disparities below 0" in said) == (shear == 0)
-
-
-def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
-    told = ["--pattern", "{col}_{row}.png", "--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
-    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
-    assert re.search(
-        r"warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm",
-        capsys.readouterr().out,
-    )
+    options = ["--shear-px", shear, shear] if shear else []
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *CAMERAS, *options) == 0
+    printed = capsys.readouterr().out
+    assert re.search(words, printed)
+    assert ("warning: things are sharp at disparities below 0" in printed) == (shear == 0)
 
 
 def test_other_sources(tmp_path: Path, capsys) -> None:
@@ -187,17 +179,175 @@ def channels(root: Path) -> None:
 LIGHT = np.ones((2, 2, H, W))
 WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
-    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "1 of 5 x 5 files missing, first row 1, col 1"),
-    ("alpha", folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")), NAMED, "0_0.png: has an alpha channel"),
+    (
+        "one missing",
+        folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5),
+        NAMED,
+        "1 of 5 x 5 files missing, first row 1, col 1",
+    ),
+    (
+        "alpha",
+        folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")),
+        NAMED,
+        "0_0.png: has an alpha channel",
+    ),
     ("turned JPEG", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
-    ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
-    ("channels as pages", folder(channels, ending="tif"), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
+    (
+        "axes of another order",
+        array(np.ones((9, H, W, 3))),
+        CAMERAS,
+        r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)",
+    ),
+    (
+        "channels as pages",
+        folder(channels, ending="tif"),
+        ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"],
+        "the axes TCYX, frames of several channels",
+    ),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
-    ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
-    ("options of other sources", folder(), [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames: not for .*, which is read as pictures"),
-]  # fmt: skip
+    (
+        "counts and photons",
+        folder(channels=1),
+        [*NAMED, "--counts", "--photons", 9],
+        "--photons: is for pictures",
+    ),
+    (
+        "options of other sources",
+        folder(),
+        [*NAMED, "--frames", 0, 1, "--width", 3],
+        "--width, --frames: not for .*, which is read as pictures",
+    ),
+]
 
 
 @pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
 def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
     check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)
+
+
+PATTERN = "{col}_{row}.%s"
+
+
+def by_the_standard(share: float) -> float:
+    """sRGB to linear as IEC 61966-2-1 has it, one number at a time."""
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("ending", "dtype"),
+    [
+        ("png", "uint8"),
+        ("png", "uint16"),
+        ("tif", "uint8"),
+        ("tif", "uint16"),
+        ("tif", "float32"),
+        ("exr", "float32"),
+    ],
+)
+def test_all_bits_of_every_format_arrive_and_opaque_alpha_is_left_out(
+    tmp_path: Path, ending, dtype, channels
+) -> None:
+    folder = make_folder(tmp_path / "a", ending=ending, dtype=dtype, channels=channels)
+    views = import_images(folder, PATTERN % ending, OPTICS, encoding="linear")
+    assert views.radiance.shape == (2, 3, H, W, channels)
+    most = {"uint8": 255, "uint16": 65535}.get(dtype, 1)
+    for k, l in np.ndindex(2, 3):
+        expected = numbers(k, l, dtype, channels).astype(np.float64) / most
+        np.testing.assert_allclose(views.view(k, l), expected, rtol=1e-6)
+    opaque = np.full((H, W), most, dtype)
+    write(folder / f"0_0.{ending}", np.dstack([numbers(0, 0, dtype, channels), opaque]))
+    with_alpha = import_images(folder, PATTERN % ending, OPTICS, encoding="linear")
+    np.testing.assert_array_equal(with_alpha.view(0, 0), views.view(0, 0))
+
+
+@pytest.mark.parametrize("bits", [4, 10, 12, 14])
+def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: int) -> None:
+    share = np.linspace(0, 1, H * W).reshape(H, W)
+    stored = np.rint(share * (2**bits - 1)).astype(np.uint8 if bits < 8 else np.uint16)
+    tifffile.imwrite(tmp_path / "0_0.tif", stored, bitspersample=bits, photometric="minisblack")
+    half_a_step = 0.5 / (2**bits - 1)
+    linear = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear").view(0, 0)[..., 0]
+    np.testing.assert_allclose(linear, share, atol=1.01 * half_a_step)
+    decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
+    expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
+    np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
+
+
+def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) -> None:
+    share = float(numbers(1, 2)[3, 4, 1]) / 255
+    make_folder(tmp_path / "png")
+    make_folder(tmp_path / "exr", ending="exr", dtype=np.float32)
+    curves: list[tuple[str, Any, float]] = [("png", None, by_the_standard(share)), ("png", "linear", share)]
+    curves += [("png", 2.2, share**2.2), ("exr", None, share), ("exr", "srgb", by_the_standard(share))]
+    for ending, encoding, expected in curves:
+        views = import_images(tmp_path / ending, PATTERN % ending, OPTICS, encoding=encoding)
+        assert views.view(1, 2)[3, 4, 1] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern", "grid"),
+    [
+        (lambda k, l: f"{l}_{k}.png", "{col}_{row}.png", None),
+        (lambda k, l: f"input_Cam{3 * k + l:03d}.png", "input_Cam{index:03d}.png", (2, 3)),
+        (lambda k, l: f"{3 * k + l + 998}.png", "{index}.png", (2, 3)),
+        (lambda k, l: f"row {k}/[{l}].png", "row {row}/[{col}].png", None),
+        (lambda k, l: f"view_{k - 1}_{l - 1:+d}.png", "view_{row}_{col}.png", None),
+        (lambda k, l: f"out_{k:02d}_{l:02d}_{7.5 * l}_-{k}.25_.png", "out_{row}_{col}_*.png", None),
+        (lambda k, l: f"{l}_{k}.{'PNG' if l else 'png'}", "{col}_{row}.png", None),
+    ],
+)
+def test_names_say_which_view_it_is(tmp_path: Path, names, pattern, grid) -> None:
+    for k, l in np.ndindex(2, 3):
+        path = tmp_path / names(k, l)
+        path.parent.mkdir(exist_ok=True)
+        write(path, numbers(k, l))
+    views = import_images(tmp_path, pattern, OPTICS, grid=grid, encoding="linear")
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))
+    assert views.grid.pixel_mm == 36.0 / W
+    assert (views.grid.rows, views.grid.cols) == (2, 3)
+
+
+def test_files_that_do_not_fit_are_named(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "a")
+    for name in ("0-2.png", "notes.txt", ".hidden"):
+        (folder / name).write_bytes((folder / "0_0.png").read_bytes())
+    with pytest.warns(UserWarning, match=r"^not used: 0-2\.png, notes\.txt, since --pattern does not fit$"):
+        assert import_images(folder, PATTERN % "png", OPTICS).grid.rows == 2
+
+
+def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> None:
+    import OpenEXR
+
+    planes = {name: np.ones((H, W), np.float32) for name in "RGBZ"}
+    wide = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)  # Rec. 2020
+    with OpenEXR.File({"type": OpenEXR.scanlineimage, "chromaticities": wide}, planes) as file:
+        file.write(str(tmp_path / "0_0.exr"))
+    with pytest.warns(UserWarning, match=r"not used: the channels Z and the chromaticities in 0_0\.exr"):
+        import_images(tmp_path, PATTERN % "exr", OPTICS)
+    (tmp_path / "0_0.exr").unlink()
+    first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
+    first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
+    with pytest.warns(UserWarning, match=r"not used: 1 more pictures in 0_0\.jpg"):
+        views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
+    np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
+    spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
+    for name, profile in spaces:
+        content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes()
+        first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
+    linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
+    first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
+    notes: list[str] = []
+    for profile in ("srgb", "other", "gimp"):
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=notes.append)
+    named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
+    assert [one for one in notes if "profile" in one] == named
+    raw = np.full((H, W), 500, np.uint16)
+    tags = [(33422, "B", 4, b"\x02\x01\x01\x00", False), (50714, "H", 1, 256, False)]
+    tifffile.imwrite(tmp_path / "0_0.tif", raw, extratags=tags)
+    import_images(tmp_path, "{col}_{row}.tif", OPTICS, note=notes.append)
+    assert notes[-1].startswith("not used: the Bayer pattern BGGR (--cfa BGGR) and the levels of black")
+    np.save(tmp_path / "0_0.npy", np.full((1, 2, H, W), 255.0))
+    with pytest.raises(InputError, match="holds numbers from 255 to 255; encoded light is from 0 to 1"):
+        import_arrays(tmp_path / "0_0.npy", OPTICS, encoding="srgb")

@@ -7,35 +7,48 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_runs import check_refused, run
-from photon_cubes import FRAMES, bits_of, packed, write_cubes
-from picture_folders import OPTICS
+from picture_folders import OPTICS, check_refused, run
+from stored_datasets import one_sentence
+from twins import unit_grid
 
-from pcii import CameraGrid, FrameFormat, InputError, ViewOrder, import_counts, open_dataset
+import pcii
+from pcii import CameraGrid, FrameFormat, ViewOrder, import_counts, open_dataset
 from pcii.exchange import count_arrays
 from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=11, width=13)
-EIGHTS = CameraGrid(
-    rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=4, width=16, shear_px=(1.5, 0)
-)
+FRAMES = 9
+
+
+def bits_of(grid: CameraGrid, frames: int = FRAMES, share: float = 0.1) -> np.ndarray:
+    """Random bits (K, L, T, H, W), bool."""
+    K, L, H, W = grid.shape_KLHW
+    return np.random.default_rng(1).random((K, L, frames, H, W)) < share
+
+
+def counts_of(bits: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> pcii.PhotonCounts:
+    """Photon counts with the frame of each."""
+    k, l, frame, i, j = np.nonzero(bits)
+    ones = np.ones(k.size, int)
+    readout: dict[str, Any] = {"frames": bits.shape[2], "bits": 1, "frame": frame}
+    return pcii.PhotonCounts.from_events(k, l, i, j, ones, grid, cfa=cfa, **readout)
+
+
+def write_cubes(root: Path, bits: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> Path:
+    """The export of a dataset of these bits."""
+    data = pcii.save_dataset(root / "data", counts_of(bits, grid, cfa), photon_budget=90)
+    return pcii.export_dataset(data, "photoncube", root / "cubes")
+
+
+def packed(bits: np.ndarray) -> np.ndarray:
+    """Eight pixels of a row in a byte, the first in the highest bit, written out."""
+    padded = np.concatenate([bits, np.zeros((*bits.shape[:-1], -bits.shape[-1] % 8), bool)], axis=-1)
+    eights = padded.reshape(*bits.shape[:-1], -1, 8)
+    return (eights * [128, 64, 32, 16, 8, 4, 2, 1]).sum(axis=-1).astype(np.uint8)
+
+
 BITS = bits_of(GRID)
-PACKED = FrameFormat(bitpack=True)
-
-
-def files_of(folder: Path, bits: np.ndarray) -> Path:
-    """A folder of packed views, row_col.npy."""
-    folder.mkdir()
-    for k, l in np.ndindex(bits.shape[:2]):
-        np.save(folder / f"{k}_{l}.npy", packed(bits[k, l]))
-    return folder
-
-
-@pytest.mark.parametrize(("shape", "share"), [((1, 1, 1), 1.0), ((2, 3, 5), 0.0), ((300, 2, 33), 0.5)])
-def test_sums_and_frames_are_those_of_unpacked_bits(shape: tuple[int, int, int], share: float) -> None:
-    bits = np.random.default_rng(3).random((1, 1, *shape)) < share
-    check_counts(counts_of_bits(bits, (0, shape[0])), bits)
 
 
 def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
@@ -57,6 +70,9 @@ def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
 @pytest.mark.parametrize("most_kept", [1 << 24, 100])
 @pytest.mark.parametrize(("piece_bytes", "span"), [(1 << 23, (0, FRAMES)), (1, (2, 6))])
 def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes, span) -> None:
+    for shape, share in (((1, 1, 1), 1.0), ((2, 3, 5), 0.0), ((300, 2, 33), 0.5)):
+        bits = np.random.default_rng(3).random((1, 1, *shape)) < share
+        check_counts(counts_of_bits(bits, (0, shape[0])), bits)
     monkeypatch.setattr(count_arrays, "MOST_KEPT", most_kept)
     monkeypatch.setattr(count_arrays, "PIECE_BYTES", piece_bytes)
     counts, seen = counts_of_bits(BITS, span), BITS[:, :, span[0] : span[1]]
@@ -65,16 +81,6 @@ def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes,
     else:
         np.testing.assert_array_equal(counts.dense, seen.sum(axis=2))
         assert counts.frame is None
-
-
-@pytest.mark.parametrize(("grid", "cfa"), [(GRID, "GRBG"), (EIGHTS, None)])
-def test_exported_cubes_come_in_by_their_poses(tmp_path: Path, grid: CameraGrid, cfa: str | None) -> None:
-    cubes = write_cubes(tmp_path, bits_of(grid), grid, cfa)
-    assert run("import", cubes, "-o", tmp_path / "back", "--focal-mm", 50, "--counts") == 0
-    back = open_dataset(tmp_path / "back")
-    assert (back.cfa, back.grid.shape_KLHW, back.grid.shear_px) == (cfa, grid.shape_KLHW, grid.shear_px)
-    assert back.grid.pixel_mm == pytest.approx(grid.pixel_mm)
-    check_counts(back.counts, bits_of(grid))
 
 
 def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path) -> None:
@@ -92,7 +98,9 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     pattern, source = None, tmp_path / "all.npy"
     options: dict[str, Any] = {"stored": FrameFormat(bitpack=True, width=13), "note": [].append}
     if kept == "files":
-        pattern, source = "{row}_{col}.npy", files_of(tmp_path / "views", BITS)
+        pattern, source = "{row}_{col}.npy", tmp_path
+        for k, l in np.ndindex(BITS.shape[:2]):
+            np.save(tmp_path / f"{k}_{l}.npy", packed(BITS[k, l]))
     elif kept == "one file":
         np.save(source, packed(BITS))
     else:
@@ -106,23 +114,23 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
 
 @pytest.mark.parametrize("share", [0.01, 0.3])
 def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
-    rng, told = np.random.default_rng(1), []
-    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=told.append)
-    assert told == [
+    rng, notes = np.random.default_rng(1), []
+    import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=notes.append)
+    assert notes == [
         "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
     ]
     counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
-    import_counts(counts, OPTICS, note=told.append)
-    assert len(told) == 1
+    import_counts(counts, OPTICS, note=notes.append)
+    assert len(notes) == 1
 
 
 @pytest.mark.parametrize(("lit", "width"), [(61, 64), (61, None), (50, 64), (61, 61)])
 def test_columns_without_a_count_are_warned_of(lit: int, width: int | None) -> None:
-    bits, told = np.zeros((1, 2, 40, 16, 64), bool), []
+    bits, notes = np.zeros((1, 2, 40, 16, 64), bool), []
     bits[..., :lit] = np.random.default_rng(1).random((1, 2, 40, 16, lit)) < 0.1
-    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=told.append)
+    import_counts(packed(bits), OPTICS, stored=FrameFormat(bitpack=True, width=width), note=notes.append)
     words = f"warning: the last {64 - lit} columns of 64 have no count in any view"
-    assert [sentence.split(";")[0] for sentence in told] == ([] if lit == width else [words])
+    assert [sentence.split(";")[0] for sentence in notes] == ([] if lit == width else [words])
 
 
 def cubes(view: str = ".", **members: Any) -> Callable[[Path], Path]:
@@ -137,6 +145,12 @@ def cubes(view: str = ".", **members: Any) -> Callable[[Path], Path]:
     return make
 
 
+def with_a_shorter_view(root: Path) -> Path:
+    folder = write_cubes(root, BITS, GRID)
+    np.save(folder / "01_00" / "frames.npy", packed(BITS[1, 0])[1:])
+    return folder
+
+
 POSES = [{"transform_matrix": (np.eye(4) + step * np.eye(4, k=3)).tolist()} for step in (0, 1e-6)]
 FILES = ["--bitpack", "--pattern", "{row}_{col}/frames.npy", *CAMERAS]
 WRONG: list[tuple[Callable[[Path], Path], list[Any], str]] = [
@@ -147,6 +161,7 @@ WRONG: list[tuple[Callable[[Path], Path], list[Any], str]] = [
     (cubes(w=30, cx=15), [], "rows are of 9 to 16 pixels, and the stated width is 30"),
     (cubes(cfa="RGGB"), ["--cfa", "GRBG"], "cfa: is RGGB; leave out --cfa"),
     (cubes("00_01", frames=POSES), [], "the camera moves, and a moving camera is no grid"),
+    (with_a_shorter_view, FILES, "frames.npy: has frames uint8 .8, 11, 2., where .*00_00/frames.npy"),
 ]
 
 
@@ -155,7 +170,54 @@ def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make, options, wor
     check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)
 
 
-def test_a_view_of_other_frames_is_refused(tmp_path: Path) -> None:
-    np.save(files_of(tmp_path / "views", BITS) / "1_0.npy", packed(BITS[1, 0])[1:])
-    with pytest.raises(InputError, match=r"1_0.npy: has frames uint8 .8, 11, 2., where .*0_0.npy"):
-        import_counts(tmp_path / "views", OPTICS, pattern="{row}_{col}.npy", stored=PACKED)
+BLOCK_BYTES = 4096
+SHEARED = pcii.CameraGrid(
+    rows=2, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=6, width=16, shear_px=(1.5, -2)
+)
+
+
+@pytest.mark.parametrize("grid", [GRID, SHEARED])
+def test_cubes_are_the_packed_frames_of_every_view(tmp_path: Path, grid: pcii.CameraGrid) -> None:
+    bits = bits_of(grid)
+    out = write_cubes(tmp_path, bits, grid, "GRBG")
+    K, L, H, W = grid.shape_KLHW
+    top = json.loads((out / "transforms.json").read_text())
+    packing = {"c": 1, "bitpack": True, "bitpack_dim": 2, "cfa": "GRBG"}
+    assert top.items() >= (packing | {"num_frames": FRAMES, "photon_budget": 90}).items()
+    for (k, l), frame in zip(np.ndindex(K, L), top["frames"], strict=True):
+        assert frame["file_path"] == f"0{k}_0{l}/frames.npy"
+        np.testing.assert_array_equal(np.load(out / frame["file_path"]), packed(bits[k, l]))
+        view = json.loads((out / f"0{k}_0{l}" / "transforms.json").read_text())
+        assert view.items() >= (packing | {"w": W, "h": H, "file_path": "frames.npy"}).items()
+        assert view["frames"] == [{"transform_matrix": frame["transform_matrix"]}] * FRAMES
+        # A camera further right is at a larger X, one further down at a smaller Y, in metres.
+        x, y = np.array(frame["transform_matrix"])[:2, 3]
+        assert (x, y) == pytest.approx((0.005 * (l - (L - 1) / 2), -0.007 * (k - (K - 1) / 2)))
+        shear = np.array([(l - (L - 1) / 2) * grid.shear_px[0], (k - (K - 1) / 2) * grid.shear_px[1]])
+        assert [view["cx"], view["cy"]] == pytest.approx(np.array([W / 2, H / 2]) + shear)
+
+
+def test_blocks_without_photons_take_no_room(tmp_path: Path) -> None:
+    grid = unit_grid(1, 1, 256, 256)
+    frame, i, j = np.array([[0, 0, 150, 299], [0, 3, 100, 255], [0, 9, 50, 255]])
+    zero, one = np.zeros(4, int), np.ones(4, int)
+    counts = pcii.PhotonCounts.from_events(zero, zero, i, j, one, grid, frames=300, bits=1, frame=frame)
+    data = pcii.save_dataset(tmp_path / "data", counts)
+    path = pcii.export_dataset(data, "photoncube", tmp_path / "out") / "00_00" / "frames.npy"
+    assert path.stat().st_size > 300 * 256 * 32
+    assert path.stat().st_blocks * 512 <= 8 * BLOCK_BYTES
+    indices = np.argwhere(np.unpackbits(np.load(path), axis=2))
+    np.testing.assert_array_equal(indices, np.stack([frame, i, j], axis=1))
+
+
+def test_counts_without_frames_are_refused_and_a_single_frame_is_one(tmp_path: Path) -> None:
+    bits = bits_of(GRID)
+    sums = pcii.PhotonCounts.from_dense(bits.sum(axis=2), GRID, frames=FRAMES, bits=1)
+    data = pcii.save_dataset(tmp_path / "sums", sums)
+    message = one_sentence(lambda: pcii.export_dataset(data, "photoncube", tmp_path / "out"), data.path)
+    assert "products.frames = true" in message
+    assert not (tmp_path / "out").exists()
+    single_frame = pcii.PhotonCounts.from_dense(bits[:, :, 0].astype(int), GRID, bits=1)
+    data = pcii.save_dataset(tmp_path / "single", single_frame)
+    out = pcii.export_dataset(data, "photoncube", tmp_path / "out")
+    np.testing.assert_array_equal(np.load(out / "01_02" / "frames.npy"), packed(bits[1, 2, :1]))

@@ -1,8 +1,6 @@
 """What pictures and `.plot()` show: the right values in the right places, bright enough to be seen."""
 
 import io
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -141,17 +139,6 @@ def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_an
         assert file.getvalue().startswith(start)
     with pytest.raises(pcii.InputError, match="style: expected"):
         sections.plot(style="print")
-
-
-def test_matplotlib_is_loaded_by_the_first_picture() -> None:
-    script = (
-        "import sys, pcii, numpy as np;"
-        "grid = pcii.CameraGrid(rows=1, cols=2, pitch_mm=(1, 1), focal_mm=1, pixel_mm=1, height=2, width=2);"
-        "counts = pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid);"
-        "repr(counts); print('matplotlib' in sys.modules, 'PIL' in sys.modules, 'pandas' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False"] * 3
 
 
 @pytest.mark.parametrize("per_pixel", [0.02, 0.2, 1.5])

@@ -20,8 +20,6 @@ from pcii.types import CameraGrid, FocalPlanes, PhotonCounts
 
 PAPER_RATE = 1000 * 3.4e-4
 
-# Entropy, Eq. 9
-
 
 @pytest.mark.parametrize(("values", "top"), [([], 1.0), ([0.0] * 5, 0.0), ([1.0] * 7, 1.0)])
 def test_one_grey_level_or_none_has_no_entropy(values, top):
@@ -45,9 +43,6 @@ def test_region_entropy_is_the_mean_of_its_colours_inside_the_region():
     pooled[0, :, 0] = [0.1, 0.9, 0.5, 0.7]
     region = np.array([[True, True, False, False]])
     assert region_entropy_bits(pooled, region, np.array([1.0, 1.0])) == (1.0 + 0.0) / 2
-
-
-# Pooling
 
 
 @pytest.mark.parametrize("window", [1, 5])
@@ -77,9 +72,6 @@ def test_pooling_leaves_the_dark_exactly_dark():
     assert pooled[0, :5, :5].all()
 
 
-# Samples of the views, Eq. 7
-
-
 def samples_at(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
     planes = FocalPlanes.at_depths(counts.grid, z_mm)
     return view_samples(counts, planes, 0, cell_px=cell_px, window_cells=window_cells)
@@ -95,9 +87,6 @@ def test_views_that_agree_at_the_planted_shift_have_no_variance_there():
     assert (focused.number[4, 8], focused.mean[4, 8], focused.variance[4, 8]) == (3, 5.0, 0.0)
     assert focused.number.sum() == 3
     assert samples_at(counts, 2.0, cell_px=1, window_cells=1).number.max() == 1
-
-
-# What Poisson noise alone would give
 
 
 def non_zero_moments(rate: float) -> tuple[float, float, float]:
@@ -140,21 +129,14 @@ def test_samples_of_a_flat_scene_have_the_variance_of_poisson_noise():
     assert mean - 1 > 4 * error
 
 
-# Saturation
-
 GRID = unit_grid(2, 2, 64, 50)
 
 
-def uneven_rate() -> np.ndarray:
-    """Light (H, W) that changes over some tens of pixels, its mean 1."""
-    i, j = np.indices(GRID.shape_HW)
-    light = 1.2 + np.sin(i / 9) * np.cos(j / 7)
-    return light / light.mean()
-
-
 def saturated(rate: float, frames: int, bits: int) -> tuple[PhotonCounts, float]:
-    """Counts, and the share of the photons that is expected to be lost."""
-    rates, most = rate * uneven_rate() / frames, 2**bits - 1
+    """Counts of light that changes over some tens of pixels, and the expected share of lost photons."""
+    i, j = np.indices(GRID.shape_HW)
+    light, most = 1.2 + np.sin(i / 9) * np.cos(j / 7), 2**bits - 1
+    rates = rate * light / light.mean() / frames
     photons = np.random.default_rng(1).poisson(rates, (frames, *GRID.shape_KLHW))
     counts = np.minimum(photons, most).sum(axis=0)
     held = sum(stats.poisson.sf(n, rates) for n in range(most))

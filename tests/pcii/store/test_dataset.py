@@ -1,10 +1,15 @@
-"""Datasets on disk: what is read back, which faults are errors, and the sample dataset."""
+"""Datasets on disk: what comes back, whose folder it is, which faults are errors, and the sample dataset."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray
+from hostile_names import NAMES
+from markdown_it import MarkdownIt
 from stored_datasets import (
     DENSE,
     GRID,
@@ -16,43 +21,36 @@ from stored_datasets import (
     one_sentence,
     rewrite_manifest,
 )
+from twins import unit_grid
 
 import pcii
 from pcii.app import commands
-from pcii.base import command_line
+from pcii.base import InputError, command_line
 from pcii.store import (
+    CARD,
+    COLLECTION_FOLDER,
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
     SAMPLE,
     TRUTH,
+    Terms,
+    index_row,
     list_files,
     open_dataset,
     radiance_name,
     read_exr,
+    read_manifest,
+    save_dataset,
     verify,
+    write_card,
     write_exr_safely,
+    write_index,
+    write_licence,
 )
-from pcii.types import Light, PhotonCounts
-
-# A dataset, read back
-
-
-@pytest.mark.parametrize("sparse", [True, False])
-def test_a_dataset_is_read_as_it_was_written(tmp_path, sparse):
-    dataset = open_dataset(make_dataset(tmp_path / "d", sparse=sparse))
-    assert dataset.grid == GRID
-    assert dataset.counts.is_sparse == sparse
-    expected = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG").events
-    for name in "klijn":
-        np.testing.assert_array_equal(getattr(dataset.counts.events, name), getattr(expected, name))
-    assert dataset.truth is not None
-    np.testing.assert_array_equal(dataset.truth.z_mm, Z_MM)
-    np.testing.assert_array_equal(dataset.truth.object_id, IDS)
-    assert dataset.truth.names == {1: "ball"}
-    assert dataset.views is not None
-    np.testing.assert_array_equal(dataset.views.view(1, 2), np.full((4, 5, 3), 5.0))
+from pcii.store import LICENCE as LICENCE_FILE
+from pcii.types import Light, PhotonCounts, PhotonTruth, Truth, Views
 
 
 def test_what_a_dataset_does_not_have_is_none_or_refused_and_other_members_are_kept(tmp_path):
@@ -80,9 +78,6 @@ def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, spar
     assert all(set(array.attrs) == {"unit", "meaning", "units", "long_name"} for array in opened.values())
 
 
-# Damage
-
-
 @pytest.mark.parametrize(
     ("part", "read"),
     [(COUNTS, lambda d: d.counts), (TRUTH, lambda d: d.truth), (RADIANCE, lambda d: d.views.view(1, 2))],
@@ -100,8 +95,6 @@ def test_damage_is_found_on_opening_or_on_reading_and_leaves_other_parts_readabl
     assert "missing" in one_sentence(lambda: open_dataset(root), file)
 
 
-# Manifests
-
 ENTRY = {"bytes": 1, "sha256": "0" * 64}
 WRONG = [
     ({"cfa": "GRGB"}, "cfa: "),
@@ -116,9 +109,6 @@ def test_a_wrong_or_absent_member_of_a_manifest_is_named(tmp_path, members, word
     root = make_dataset(tmp_path / "d")
     rewrite_manifest(root, **members)
     assert words in one_sentence(lambda: open_dataset(root), root / MANIFEST)
-
-
-# Radiance
 
 
 def test_radiance_of_another_size_is_refused(tmp_path):
@@ -153,9 +143,6 @@ def test_radiance_comes_back_in_its_channels_and_in_single_precision(tmp_path, s
     np.testing.assert_array_equal(again, image)
     path.write_bytes(b"v/1\x01" + bytes(50))
     assert "cannot be read" in one_sentence(lambda: read_exr(path), path)
-
-
-# The sample
 
 
 def test_the_sample_is_small_and_whole_and_has_all_that_an_analysis_uses() -> None:
@@ -200,3 +187,180 @@ def test_the_sample_is_what_its_recipe_gives(tmp_path: Path) -> None:
     for k, l in np.ndindex(5, 5):
         totals = [int(data.counts.view(k, l).sum()) for data in (again, sample)]
         assert abs(totals[0] - totals[1]) < 5 * np.sqrt(2 * 2000)
+
+
+LIGHT = np.random.default_rng(1).random((*GRID.shape_KLHW, 3)).astype(np.float32)
+COUNTED = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG")
+EVENTS = COUNTED.events
+PHOTONS = PhotonTruth(
+    **{name: getattr(EVENTS, name).repeat(EVENTS.n) for name in "klij"},
+    object_id=np.arange(COUNTED.total) % 2,
+    z_mm=np.full(COUNTED.total, 540.0, np.float32),
+)
+MAPS = {
+    "normal": np.zeros((4, 5, 3), np.float32),
+    "coverage": np.ones((4, 5), np.float32),
+    "visible_views": np.full((4, 5), 6, np.uint16),
+}
+SAVED_TRUTH = Truth(Z_MM, IDS, {1: "ball"}, photons=PHOTONS, unscored=frozenset({1}), **MAPS)
+
+
+@pytest.mark.parametrize("sparse", [True, False])
+def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
+    counts = COUNTED
+    if sparse:
+        counts = PhotonCounts.from_events(*(getattr(EVENTS, name) for name in "klijn"), GRID, cfa="GRBG")
+    images = (Views(LIGHT, GRID), counts)
+    texts: dict[str, Any] = {"title": "Mine", "licence": "CC0", "citation": "Me", "origin": "a camera"}
+    depths: dict[str, Any] = {"z_mm": [540, 620], "z_range_mm": (450, 750), "photon_budget": 10}
+    saved = save_dataset(tmp_path / "d", images, SAVED_TRUTH, **depths, **texts)
+    with pytest.raises(InputError, match="holds something else"):
+        save_dataset(tmp_path / "d", images)
+    dataset = open_dataset(tmp_path / "d")
+    assert dataset.manifest == saved.manifest
+    assert (dataset.grid, dataset.cfa, dataset.light.photons) == (GRID, "GRBG", 10)
+    assert dataset.counts.is_sparse == sparse
+    np.testing.assert_array_equal(dataset.counts.dense, DENSE)
+    assert dataset.views is not None
+    assert dataset.views.cfa is None
+    np.testing.assert_array_equal(np.asarray(dataset.views.radiance), LIGHT)
+    assert dataset.truth is not None
+    for name in ("z_mm", "object_id", "names", "normal", "coverage", "visible_views", "unscored"):
+        np.testing.assert_array_equal(getattr(dataset.truth, name), getattr(SAVED_TRUTH, name))
+    assert dataset.truth.photons is not None
+    for name in ("k", "l", "i", "j", "object_id", "z_mm"):
+        np.testing.assert_array_equal(getattr(dataset.truth.photons, name), getattr(PHOTONS, name))
+    assert dataset.analysis == {"z_mm": [540, 620], "z_range_mm": [450, 750]}
+    assert {name: dataset.manifest[name] for name in texts} == texts
+    assert verify(tmp_path / "d") > 10
+
+
+@pytest.mark.parametrize("most", [0, 1, 256, 70_000, 1 << 39])
+def test_counts_of_any_number_and_share_of_pixels_come_back(tmp_path: Path, most: int) -> None:
+    grid = unit_grid(2, 2, 20, 20)
+    dense = np.zeros(grid.shape_KLHW, np.int64)
+    dense[1, 0, 3, 4] = most
+    for name, array in (("events", dense), ("dense", dense + np.arange(20))):
+        dataset = save_dataset(tmp_path / "new" / name, PhotonCounts.from_dense(array, grid))
+        np.testing.assert_array_equal(dataset.counts.dense, array)
+        assert dataset.has(f"{COUNTS}/dense") == (name == "dense")
+
+
+def test_the_identity_follows_from_the_content(tmp_path: Path) -> None:
+    first = save_dataset(tmp_path / "a", COUNTED, title="one", z_mm=500).manifest["identity"]
+    assert save_dataset(tmp_path / "b", COUNTED, title="two").manifest["identity"] == first
+    others = [
+        (PhotonCounts.from_dense(DENSE + 1, GRID, cfa="GRBG"), None),
+        (PhotonCounts.from_dense(DENSE, GRID), None),
+        (PhotonCounts.from_dense(DENSE, replace(GRID, pitch_mm=(2.0, 1.0)), cfa="GRBG"), None),
+        (COUNTED, Truth(Z_MM, IDS, {1: "ball"})),
+        (COUNTED, Truth(Z_MM, IDS, {1: "cube"})),
+        (COUNTED, Truth(Z_MM, IDS, {1: "ball"}, unscored=frozenset({1}))),
+    ]
+    saved = [save_dataset(tmp_path / f"{n}", *other) for n, other in enumerate(others)]
+    assert len({first, *(dataset.manifest["identity"] for dataset in saved)}) == 7
+
+
+OTHER = unit_grid(2, 3, 4, 5, pitch_mm=(2.0, 2.0))
+BRIGHT = np.full((*GRID.shape_KLHW, 1), 1e300)
+SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
+NAN_LAST = LIGHT.copy()
+NAN_LAST[1, 2, 0, 0, 0] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("images", "options", "words"),
+    [
+        ((COUNTED, Views(LIGHT, OTHER)), {}, "different camera grids"),
+        (Views(BRIGHT, GRID), {}, r"view \(0, 0\) is too bright"),
+        ((COUNTED, Views(NAN_LAST, GRID)), {}, r"view \(1, 2\) holds NaN"),
+        (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: near must be less than far"),
+        (COUNTED, {"truth": Truth(Z_MM[:3], IDS[:3], {1: "a"})}, r"truth: expected .* of \(4, 5\)"),
+        (COUNTED, {"truth": replace(SAVED_TRUTH, photons=SHUFFLED)}, "not those of the counts"),
+        (COUNTED, {"view_z_mm": np.full(GRID.shape_KLHW, np.nan)}, "view_z_mm: expected depths of"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_in_a_sentence(tmp_path: Path, images, options, words) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        save_dataset(tmp_path / "d", images, **options)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_depths_of_every_view_are_kept_with_and_without_a_virtual_centre(tmp_path: Path) -> None:
+    z_mm = np.arange(1, DENSE.size + 1).reshape(DENSE.shape) * 1.5
+    z_mm[0, 1, 2, 3] = np.inf
+    for name, truth in (("both", SAVED_TRUTH), ("alone", None)):
+        save_dataset(tmp_path / name, COUNTED, truth, view_z_mm=z_mm, radiance_unit="cd/m^2")
+        dataset = open_dataset(tmp_path / name)
+        np.testing.assert_array_equal(dataset.truth_array("view_z_mm"), z_mm.astype(np.float32))
+        assert (dataset.truth is None) == (truth is None)
+        assert dataset.manifest["radiance_unit"] == "cd/m^2"
+        assert verify(tmp_path / name) > 2
+
+
+MAX_LINES = 30
+TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "https://example.org/photons")
+
+
+def make_pair(root: Path) -> Path:
+    """Two datasets by hand that differ in their budget."""
+    root.mkdir()
+    rows = []
+    for budget in (10.0, 20.0):
+        folder = root / f"budget_{budget:g}"
+        recipe = {"scene": "by hand", "seed": 3, "photons": {"budget": budget}}
+        make_dataset(folder, recipe=recipe, identity=f"{budget}", photons={"total": 5})
+        values = {"photons.budget": budget}
+        rows.append(index_row(folder.name, values, read_manifest(folder), folder / MANIFEST))
+    COLLECTION_FOLDER.write(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
+    write_index(root, rows)
+    return root
+
+
+@pytest.mark.parametrize("make", [make_dataset, make_pair])
+def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
+    root = make(tmp_path / "data")
+    write_card(root, TERMS)
+    text = (root / CARD).read_text()
+    assert len(text.splitlines()) <= MAX_LINES
+    write_licence(root, TERMS)
+    for words in ("CC-BY-4.0", "Ada, Grace", TERMS.citation, TERMS.url):
+        assert words in text
+        assert words in (root / LICENCE_FILE).read_text()
+    if make is make_pair:
+        assert text.startswith("# by hand\n")  # the scene, where no title is stated
+        assert "2 datasets, which differ in photons.budget" in text
+    (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")
+    with pytest.raises(InputError, match="not listed in"):
+        verify(root)
+    write_card(root, TERMS)
+    assert verify(root)
+    assert (root / CARD).read_text() == text
+
+
+def test_a_card_follows_the_data_and_the_terms_alone(tmp_path):
+    root, other = make_dataset(tmp_path / "data"), make_dataset(tmp_path / "other")
+    rewrite_manifest(other, timings_s={"photons": 9.5})
+    for folder in (root, other):
+        write_card(folder, Terms())
+    assert (root / CARD).read_bytes() == (other / CARD).read_bytes()
+    text = (root / CARD).read_text()
+    assert "Licence: none is stated." in text  # what nobody has said
+    before = (root / MANIFEST).read_bytes()
+    write_card(root, TERMS)
+    assert (root / MANIFEST).read_bytes() == before
+    assert "none is stated" not in (root / CARD).read_text()
+    (root / CARD).write_text("# My own words")
+    write_card(root, TERMS)
+    assert (root / CARD).read_text() == "# My own words"
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_names_with_markup_appear_as_plain_text_in_cards(tmp_path, name):
+    root = make_dataset(tmp_path / "data", title=name, objects={"1": name}, recipe={"scene": name})
+    for address in (name, f"https://example.org/{name}", f"javascript://{name}"):
+        write_card(root, Terms(address, (name,), name, address))
+        page = MarkdownIt("gfm-like", {"html": True, "linkify": False}).render((root / CARD).read_text())
+        assert {*re.findall(r"<(\w+)", page)} <= {"h1", "p", "code", "pre", "a", "blockquote"}
+        assert all(link.startswith("https://") for link in re.findall('href="([^"]*)', page))

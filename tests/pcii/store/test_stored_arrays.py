@@ -38,9 +38,6 @@ def test_arrays_of_any_shape_come_back_to_the_bit(tmp_path, array):
     assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
 
 
-# Arrays of strangers
-
-
 @pytest.fixture
 def stored(tmp_path):
     """A map of 3 x 4 on disk, and a way to read it with the list of files as it is then."""
@@ -53,19 +50,15 @@ def stored(tmp_path):
     return tmp_path / "a.zarr" / "x", read
 
 
-def test_chunks_of_zeros_are_there_and_none_may_lack_or_be_damaged(stored):
+def test_shapes_are_the_grids_chunks_of_zeros_are_there_and_none_may_lack_or_be_damaged(stored):
     path, read = stored
     np.testing.assert_array_equal(read(row=3, col=4), np.zeros((3, 4)))
+    assert "expected a shape of (3, 5), got (3, 4)" in one_sentence(lambda: read(row=3, col=5), path)
     chunk = next(file for file in (path / "c").rglob("*") if file.is_file())
     flip_a_bit(chunk, 70)
     assert "cannot be read" in one_sentence(read, path)
     chunk.unlink()
     assert "expected 1 chunks, the manifest lists 0" in one_sentence(read, path)
-
-
-def test_a_shape_that_the_camera_grid_does_not_have_is_refused(stored):
-    path, read = stored
-    assert "expected a shape of (3, 5), got (3, 4)" in one_sentence(lambda: read(row=3, col=5), path)
 
 
 CHANGES = [
