@@ -193,8 +193,9 @@ def _warn_of_numbers(name: str, stored: np.ndarray, stated: FrameFormat, note: N
         return
     step = int(np.gcd.reduce(stored, axis=None))
     if step > 1 and np.count_nonzero(stored) * np.log(step) > SURE_NATS:
-        what = f"all numbers of {name} are multiples of {step}"
-        note(f"warning: {what}; if that is one photon, give --gain {step}")
+        advice = f"if that is one photon, give --gain {step}"
+        advice += "; if the bytes of each number are in the other order, swap them" if step % 256 == 0 else ""
+        note(f"warning: all numbers of {name} are multiples of {step}; {advice}")
         return
     if stated.bits is not None:
         return

@@ -48,8 +48,8 @@ class CameraGrid:
     Y = (k - (rows-1)/2) pitch_y. `pitch_mm` is (pitch_x, pitch_y). Each image has `height` x `width`
     square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
     ((height-1)/2, (width-1)/2). In a sheared grid `shear_px` (x, y) is not 0: each camera's axis meets it
-    further right (down) by so many px per camera step, counted from the centre of the grid, so that a point
-    whose parallax equals the shear appears at the same pixel of all views. Raises `InputError` for a size
+    further right (down) by this number of px per camera step, counted from the centre of the grid, so that a
+    point whose parallax equals the shear appears at the same pixel of all views. Raises `InputError` for a size
     below 1, a length not above 0 or a shear that is not finite.
 
     >>> grid = CameraGrid(

@@ -197,7 +197,11 @@ def test_marks_are_named_and_a_mask_leaves_them_out(tmp_path: Path) -> None:
 def test_numbers_that_are_stored_otherwise_are_named() -> None:
     counts = np.random.default_rng(9).poisson(3.0, (2, 2, 3, 40, 50)).astype(np.uint16)
     for stored, bits, words in (
-        (counts.byteswap(), 12, "multiples of 256"),
+        (
+            counts.byteswap(),
+            12,
+            "multiples of 256; .*; if the bytes of each number are in the other order, swap",
+        ),
         (counts.clip(max=15) << 4, 8, "multiples of 16; if that is one photon, give --gain 16$"),
         (counts.clip(max=1) * 255, None, "multiples of 255; if that is one photon, give --gain 255$"),
         (counts.clip(max=3), None, "of the numbers of array are 3 and none is above, .* give --bits 2$"),
