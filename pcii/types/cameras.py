@@ -49,8 +49,8 @@ class CameraGrid:
     square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
     ((height-1)/2, (width-1)/2). In a sheared grid `shear_px` (x, y) is not 0: it moves each camera's axis to
     the right (down), by this number of px per camera step from the centre of the grid, so that a point whose
-    parallax equals the shear appears at the same pixel of all views. Raises `InputError` for a size below 1, a
-    length not above 0 or a shear that is not finite.
+    parallax equals the shear appears at the same pixel of all views. Raises `InputError` for a size below 1,
+    a length not above 0 or a shear that is not finite.
 
     >>> grid = CameraGrid(
     ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=1024, width=1024
