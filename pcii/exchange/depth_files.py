@@ -68,6 +68,11 @@ class DepthFile:
             )
         hit = z_mm[np.isfinite(z_mm)]
         reach = f"{hit.min():.4g} to {hit.max():.4g} mm" if hit.size else "nothing"
+        if hit.size and hit.max() < grid.focal_mm:
+            note(
+                f"warning: {path.name} has depths of {reach}, nearer than the focal length of "
+                f"{grid.focal_mm:g} mm; if they are in metres, import again with --depth-unit-mm 1000"
+            )
         note(f"with the true depth of the virtual centre, {reach}, from {path.name}")
         count = np.count_nonzero(is_unknown)
         if count:
