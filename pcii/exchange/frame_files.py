@@ -163,9 +163,10 @@ class FrameFiles:
     def __len__(self) -> int:
         return len(self.paths)
 
-    def __getitem__(self, some: slice) -> np.ndarray:
-        frames = [_frames_of(self.stored, self.key, path) for path in self.paths[some]]
-        for path, frame in zip(self.paths[some], frames, strict=True):
+    def __getitem__(self, numbers: slice) -> np.ndarray:
+        paths = self.paths[numbers]
+        frames = [_frames_of(self.stored, self.key, path) for path in paths]
+        for path, frame in zip(paths, frames, strict=True):
             if frame.shape != (1, *frames[0].shape[1:]) or frame.dtype != frames[0].dtype:
                 raise InputError(f"{path}: expected one frame as in {self.paths[0].name}")
         return np.concatenate(frames)
