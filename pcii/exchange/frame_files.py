@@ -66,6 +66,8 @@ class FrameFormat:
             raise InputError("--offset, --gain: are for numbers, and packed frames have bits")
         if self.gain is not None and not self.gain > 0:
             raise InputError(f"--gain: expected a number above 0, got {self.gain:g}")
+        if self.bit_order not in (None, "big", "little"):
+            raise InputError(f"--bit-order: expected big or little, got {self.bit_order!r}")
         if self.frame_size is not None and min(*self.frame_size, *(n + 1 for n in self.skip_bytes or ())) < 1:
             raise InputError("--frame-size, --skip-bytes: expected at least one pixel, and no bytes below 0")
 

@@ -122,6 +122,8 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     are not packed along the width, and a single cube whose camera moves.
     """
     file = Path(path) / TRANSFORMS if Path(path).is_dir() else Path(path)
+    if not file.is_file():
+        raise InputError(f"{file}: there is no such file; expected a transforms.json as nerfstudio reads it")
     content = file.read_bytes()
     try:
         document = _Document.model_validate(json.loads(content))

@@ -147,11 +147,13 @@ def test_members_that_are_wrong_are_named(tmp_path: Path, top, frame, words) -> 
     assert re.match(rf"{path}: {words}", message), message
 
 
-def test_sizes_of_some_frames_alone_are_refused(tmp_path: Path) -> None:
+def test_sizes_of_some_frames_alone_and_no_file_are_refused(tmp_path: Path) -> None:
     frames = frames_of(1, 2)
     frames[0] |= {"w": 640, "h": 480}
     path = written(tmp_path, frames, w=None, h=None)
     assert "frames.1: w, h: missing" in one_sentence(lambda: read_transforms(path), path)
+    path.unlink()
+    assert "there is no such file" in one_sentence(lambda: read_transforms(path), path)
 
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()
