@@ -257,9 +257,13 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
         raise InputError(f"{source}: there is no such file or folder")
     pattern, is_folder = options["pattern"], source.is_dir()
     if options["lens_array"] is not None:
+        if is_folder:
+            raise InputError(
+                f"{source}: is a folder; --lens-array is for one picture, which holds all lens images"
+            )
         return import_lens_array
     if pattern is None:
-        if source.suffix == ".json" or (source / TRANSFORMS).is_file():
+        if (source.suffix == ".json" and not is_folder) or (source / TRANSFORMS).is_file():
             has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
             return import_posed_cubes if has_cubes else import_posed_pictures
         if (source / PARAMETERS).is_file():
@@ -300,9 +304,9 @@ def _arguments(
     others = ", ".join(f"--{name.replace('_', '-')}" for name in names if name not in accepted)
     if others:
         raise InputError(f"{others}: not for {source}, which is read as {what}")
-    made = {"lenses": _lens_array, "optics": _optics, "encoding": _encoding}
+    builders = {"lenses": _lens_array, "optics": _optics, "encoding": _encoding}
     values = {**options, **groups, **listeners}
-    values |= {name: make(options) for name, make in made.items() if name in parameters}
+    values |= {name: build(options) for name, build in builders.items() if name in parameters}
     return {name: value for name, value in values.items() if name in parameters}
 
 

@@ -224,14 +224,16 @@ def files_by_camera(
     if others:
         note(f"not used: {listed_names(others)}, since --pattern does not fit")
     numbers: list[Sequence[int]] = [sorted({*column}) for column in zip(*files, strict=True)]
-    for axis in range(len(names)):  # whereas frames may be some of many
+    for axis in range(len(names)):  # whereas numbers of frames may have gaps
         numbers[axis] = range(numbers[axis][0], numbers[axis][-1] + 1)
-    if math.prod(map(len, numbers[: len(names)])) > MOST_VIEWS:
+    if names == ["index"] and grid is not None:  # the last views may be missing
+        first, end = numbers[0][0], numbers[0][-1] + 1
+        numbers[0] = range(first, max(end, first + math.prod(grid)))
+    if math.prod(axis[-1] - axis[0] + 1 for axis in numbers[: len(names)]) > MOST_VIEWS:
         ends = " and ".join(f"{name} {r[0]} to {r[-1]}" for name, r in zip(names, numbers, strict=False))
-        raise InputError(f"{folder}: {ends} are too far apart for a grid of views")
+        raise InputError(f"{folder}: {ends} are too far apart for a grid of at most {MOST_VIEWS} views")
     if names == ["index"]:
-        first, count = numbers[0][0], max(len(numbers[0]), math.prod(grid or ()))
-        numbers[0], table = range(first, first + count), order.table_of(folder, count, grid)
+        table = order.table_of(folder, len(numbers[0]), grid)
     else:
         table = len(numbers[0]), len(numbers[1])
         if grid is not None and table != (grid[::-1] if order.swap_axes else grid):

@@ -66,6 +66,8 @@ class FrameFormat:
             raise InputError("--offset, --gain: are for numbers, and packed frames have bits")
         if self.gain is not None and not self.gain > 0:
             raise InputError(f"--gain: expected a number above 0, got {self.gain:g}")
+        if self.bit_order not in (None, "big", "little"):
+            raise InputError(f"--bit-order: expected big or little, got {self.bit_order!r}")
         if self.frame_size is not None and min(*self.frame_size, *(n + 1 for n in self.skip_bytes or ())) < 1:
             raise InputError("--frame-size, --skip-bytes: expected at least one pixel, and no bytes below 0")
 
@@ -163,9 +165,10 @@ class FrameFiles:
     def __len__(self) -> int:
         return len(self.paths)
 
-    def __getitem__(self, some: slice) -> np.ndarray:
-        frames = [_frames_of(self.stored, self.key, path) for path in self.paths[some]]
-        for path, frame in zip(self.paths[some], frames, strict=True):
+    def __getitem__(self, numbers: slice) -> np.ndarray:
+        paths = self.paths[numbers]
+        frames = [_frames_of(self.stored, self.key, path) for path in paths]
+        for path, frame in zip(paths, frames, strict=True):
             if frame.shape != (1, *frames[0].shape[1:]) or frame.dtype != frames[0].dtype:
                 raise InputError(f"{path}: expected one frame as in {self.paths[0].name}")
         return np.concatenate(frames)

@@ -129,19 +129,7 @@ def find_grid(
     _check_moved(file, moved_px, np.linalg.norm(off[:3], axis=0), "mm from its place in a plane grid")
     off_px = np.hypot(off[3], off[4])
     _check_moved(file, off_px, off_px, "px from where cx and cy of a grid with one shear would be")
-    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
-    if missing < 2:
-        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
-    if focal_mm is not None:
-        pixel_mm = focal_mm / file.focal_px
-    else:
-        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
-        focal_mm = _digits(file.focal_px * pixel_mm)
-    if missing == 3:
-        note(
-            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
-            "its ratio, and nothing else of them matters"
-        )
+    focal_mm, pixel_mm = _film_mm(file, focal_mm, pixel_mm, sensor_mm, note)
     x, y = _digits(means[3]), _digits(means[4])
     if x or y:
         note(
@@ -159,6 +147,26 @@ def find_grid(
         shear_px=(_digits(slopes[3]), _digits(slopes[4])),
     )
     return grid, np.array(file.file_paths, object)[numbers]
+
+
+def _film_mm(
+    file: TransformsFile, focal_mm: float | None, pixel_mm: float | None, sensor_mm: float | None, note: Note
+) -> tuple[float, float]:
+    """Focal length and side of a pixel, of which the file has the ratio, from one length of the film."""
+    missing = (focal_mm, pixel_mm, sensor_mm).count(None)
+    if missing < 2:
+        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file has their ratio")
+    if focal_mm is not None:
+        pixel_mm = focal_mm / file.focal_px
+    else:
+        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
+        focal_mm = _digits(file.focal_px * pixel_mm)
+    if missing == 3:
+        note(
+            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
+            "its ratio, and nothing else of them matters"
+        )
+    return focal_mm, pixel_mm
 
 
 def _places_in_common_frame(file: TransformsFile) -> np.ndarray:

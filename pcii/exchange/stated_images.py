@@ -109,7 +109,7 @@ class ViewOrder:
         Raises `InputError`, naming the source, if the count is another one.
         """
         rows, cols = grid or (math.isqrt(count), math.isqrt(count))
-        if rows * cols != count:
+        if rows < 1 or rows * cols != count:
             right = "no square grid; say how many with --grid" if grid is None else f"not {rows} x {cols}"
             raise InputError(f"{source}: {count} views are {right}")
         return (cols, rows) if self.swap_axes else (rows, cols)

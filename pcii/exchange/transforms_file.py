@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 """Of numbers that are equal: metres, parts of a rotation, pixels."""
 PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 """Values of camera_model that, without distortion, are pinholes."""
-DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye", "distortion_params")
+DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "is_fisheye")
 FOCAL = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
 """Endings that NeRF's own files leave out of the names of pictures."""
@@ -57,6 +57,16 @@ class _Lens(BaseModel):
     camera_angle_x: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_angle_y: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_model: str | None = None
+    is_fisheye: bool | None = None
+    k1: Number | None = None
+    k2: Number | None = None
+    k3: Number | None = None
+    k4: Number | None = None
+    k5: Number | None = None
+    k6: Number | None = None
+    p1: Number | None = None
+    p2: Number | None = None
+    distortion_params: list[Number] | None = None
 
 
 class _Frame(_Lens):
@@ -112,6 +122,8 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     are not packed along the width, and a single cube whose camera moves.
     """
     file = Path(path) / TRANSFORMS if Path(path).is_dir() else Path(path)
+    if not file.is_file():
+        raise InputError(f"{file}: there is no such file; expected a transforms.json as nerfstudio reads it")
     content = file.read_bytes()
     try:
         document = _Document.model_validate(json.loads(content))
@@ -140,9 +152,8 @@ def read_transforms(path: str | Path, *, note: Note = warn) -> TransformsFile:
     extras = [name for lens in (document, *frames) for name in lens.model_extra or {}]
     if not has_cubes:
         extras += [name for name in ("cfa", "c") if getattr(document, name) is not None]
-    unused = [name for name in dict.fromkeys(extras) if name not in DISTORTIONS]
-    if unused:
-        note(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
+    if extras:
+        note(f"not used of {file.name}: {visible(', '.join(dict.fromkeys(extras)))[:200]}")
     return TransformsFile(
         path=file,
         poses=poses,
@@ -189,9 +200,9 @@ def _common_lens(file: Path, document: _Document) -> tuple[tuple[int, int, float
     top = document.model_dump(exclude={"frames"}, exclude_none=True)
     first, centres = None, []
     for number, frame in enumerate(document.frames):
-        own = frame.model_dump(exclude_none=True)
-        stated, place = top | own, f"frames.{number}"
-        if any(np.any(stated.get(name, 0)) for name in DISTORTIONS):
+        of_frame = frame.model_dump(exclude_none=True)
+        stated, place = top | of_frame, f"frames.{number}"
+        if any(map(stated.get, DISTORTIONS)) or any(stated.get("distortion_params", ())):
             raise InputError(
                 f"{file}: {place}: the lens distorts (k1, is_fisheye ...); undistort the pictures"
             )
@@ -200,8 +211,11 @@ def _common_lens(file: Path, document: _Document) -> tuple[tuple[int, int, float
                 f"{file}: camera_model: expected one of {', '.join(PINHOLES)}; pictures of other lenses are "
                 "undistorted first"
             )
+        if not {"w", "h"} <= stated.keys():
+            raise InputError(f"{file}: {place}: w, h: missing; the width and height of the frame in pixels")
         width, height = stated["w"], stated["h"]
-        focal_px = _focal_px(file, own if any(name in own for name in FOCAL) else top, width, height)
+        lens = of_frame if any(name in of_frame for name in FOCAL) else top
+        focal_px = _focal_px(file, lens, width, height)
         first = first or (width, height, focal_px)
         is_other_focal = abs(focal_px - first[2]) * max(width, height) / 2 > MOST_PX * first[2]
         if (width, height) != first[:2] or is_other_focal:

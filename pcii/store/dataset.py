@@ -30,6 +30,7 @@ import numpy as np
 from pcii.base import InputError, ShortForm, listed, new_folder_safely, times
 from pcii.store.folders import (
     MANIFEST,
+    REMEDY,
     DatasetManifest,
     Files,
     check_free,
@@ -282,8 +283,11 @@ class Dataset(ShortForm):
     def _packed(self) -> dict[str, bytes]:
         """Content of all packed files by their paths."""
         archive = io.BytesIO(read_listed(self.path, ARRAYS, self.manifest.files[ARRAYS]))
-        with zipfile.ZipFile(archive) as members:
-            return {name: members.read(name) for name in self.manifest.packed}
+        try:
+            with zipfile.ZipFile(archive) as members:
+                return {name: members.read(name) for name in self.manifest.packed}
+        except (KeyError, zipfile.BadZipFile) as fault:
+            raise InputError(f"{self.path / ARRAYS}: cannot be read ({fault}); {REMEDY}") from None
 
     def _arrays(
         self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
@@ -303,13 +307,19 @@ def open_dataset(path: str | Path) -> Dataset:
 
     Contents are compared with their SHA-256 when they are read; files that the manifest does not list are
     ignored. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since
-    it was written, or a file that is missing or truncated.
+    it was written or lacks a view or the archive, or a file that is missing or truncated.
 
     >>> open_dataset(SAMPLE).counts.total
     50202
     """
     root = Path(path)
     manifest = read_manifest(root)
+    needed = [ARRAYS] if manifest.packed else []
+    if lists_part(manifest.files, RADIANCE):
+        needed += [radiance_name(k, l) for k, l in np.ndindex(manifest.grid.rows, manifest.grid.cols)]
+    for name in needed:
+        if name not in manifest.files:
+            raise InputError(f"{root / MANIFEST}: files: {name} is missing; {REMEDY}")
     for name, entry in manifest.files.items():
         check_size(root, name, entry)
     return Dataset(root, manifest)

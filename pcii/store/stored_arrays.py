@@ -202,9 +202,10 @@ def write_exr_safely(path: Path, image: np.ndarray) -> None:
     """
     import OpenEXR
 
-    some = np.asarray(image[::16], np.float32)
-    pays = len(_exr(some, OpenEXR.ZIP_COMPRESSION)) < WORTH_ZIP * some.nbytes
-    write_bytes_safely(path, _exr(image, OpenEXR.ZIP_COMPRESSION if pays else OpenEXR.NO_COMPRESSION))
+    rows = np.asarray(image[::16], np.float32)
+    is_compressible = len(_exr(rows, OpenEXR.ZIP_COMPRESSION)) < WORTH_ZIP * rows.nbytes
+    compression = OpenEXR.ZIP_COMPRESSION if is_compressible else OpenEXR.NO_COMPRESSION
+    write_bytes_safely(path, _exr(image, compression))
 
 
 def _exr(image: np.ndarray, compression: object) -> bytes:

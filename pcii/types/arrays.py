@@ -75,7 +75,7 @@ def freeze_array(owner: object, name: str, dtype: str, shape: tuple[int | str, .
         isinstance(values, np.ndarray)
         and (values.dtype.kind in "fiu" if dtype == "real numbers" else values.dtype == dtype)
         and values.ndim == len(shape)
-        and all(isinstance(size, str) or size == own for size, own in zip(shape, values.shape, strict=True))
+        and all(isinstance(size, str) or size == n for size, n in zip(shape, values.shape, strict=True))
     )
     if not fits:
         is_array = isinstance(values, np.ndarray)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from pcii.base import InputError, ShortForm, times
-from pcii.types.arrays import Plottable, read_only, whole_counts
+from pcii.types.arrays import Plottable, is_whole, read_only, whole_counts
 from pcii.types.cameras import PLAIN, CameraGrid, Readout, channel_count, check_cfa, colour_cells
 
 
@@ -267,9 +267,12 @@ class PhotonCounts(Plottable):
         ([[0.288, 0.693]], [[0.0, inf]])
         """
         image, number = self.view(k, l), self.readout.frames
-        first, end = frames or (0, number)
-        if not 0 <= first < end <= number:
-            raise InputError(f"frames: expected (first, end), 0 <= first < end <= {number}, got {frames!r}")
+        match (0, number) if frames is None else frames:
+            case (first, end) if is_whole(first) and is_whole(end) and 0 <= first < end <= number:
+                pass
+            case _:
+                expected = f"(first, end), 0 <= first < end <= {number}"
+                raise InputError(f"frames: expected {expected}, got {frames!r}")
         if end - first < number:
             if self.frame is None:
                 raise InputError(f"frames: only the sums over all {number} frames were stored")

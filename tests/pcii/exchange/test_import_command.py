@@ -186,6 +186,19 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
         "1 of 5 x 5 files missing, first row 1, col 1",
     ),
     (
+        "more views than there can be",
+        folder(),
+        ["--pattern", "{index}_0.png", *CAMERAS, "--grid", 10**20, 10**20],
+        "too far apart for a grid of at most 100000 views",
+    ),
+    (
+        "no view in a row",
+        folder(),
+        ["--pattern", "{index}_0.png", *CAMERAS, "--grid", -1, -3],
+        "views are not -1 x -3",
+    ),
+    ("lenses of a folder", folder(), ["--lens-array", 2, 2, *CAMERAS], "--lens-array is for one picture"),
+    (
         "alpha",
         folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")),
         NAMED,

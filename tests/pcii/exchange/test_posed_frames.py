@@ -105,7 +105,12 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     for frame in frames:
         write(tmp_path / frame["file_path"], numbers(0, 0))
         frame |= {"file_path": frame["file_path"].replace("/", "\\").removesuffix(".png"), "sharpness": 30}
-        frame |= {"camera_angle_x": 2 * math.atan(W / 2 / 50), "cx": "4.0", "k1": None}  # wins over fl_x
+        frame |= {
+            "camera_angle_x": 2 * math.atan(W / 2 / 50),
+            "cx": "4.0",
+            "k1": None,
+            "k2": "0.0",
+        }  # wins over fl_x
         del frame["transform_matrix"][3]
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
     path.write_text(path.read_text(), "utf-16")
@@ -123,6 +128,7 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
         ({"fl_x": None, "fl_y": None}, {}, "fl_x: missing"),
         ({"fl_y": 1010.0}, {}, "fl_y: is 1010 where fl_x is 1000; pixels that are not square"),
         ({"p2": -1e-7}, {}, r"frames\.0: the lens distorts"),
+        ({"distortion_params": [0, [0]]}, {}, r"distortion_params\.1: "),
         ({"camera_model": "OPENCV_FISHEYE"}, {}, "camera_model: expected one of OPENCV"),
         ({}, {"transform_matrix": changed(0, 1, 0.3)}, r"frames\.1\.transform_matrix: is no rotation"),
         ({}, {"file_path": "images/../../x.png"}, r"frames\.1\.file_path: expected a path inside"),
@@ -139,6 +145,15 @@ def test_members_that_are_wrong_are_named(tmp_path: Path, top, frame, words) -> 
     path = written(folder, frames, **top)
     message = one_sentence(lambda: read_transforms(path), path)
     assert re.match(rf"{path}: {words}", message), message
+
+
+def test_sizes_of_some_frames_alone_and_no_file_are_refused(tmp_path: Path) -> None:
+    frames = frames_of(1, 2)
+    frames[0] |= {"w": 640, "h": 480}
+    path = written(tmp_path, frames, w=None, h=None)
+    assert "frames.1: w, h: missing" in one_sentence(lambda: read_transforms(path), path)
+    path.unlink()
+    assert "there is no such file" in one_sentence(lambda: read_transforms(path), path)
 
 
 SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()

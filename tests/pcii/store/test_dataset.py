@@ -101,6 +101,8 @@ WRONG = [
     ({"analysis": {"z_mm": [-5.0]}}, "analysis.z_mm.0: "),
     ({"files": ...}, "files: "),
     ({"files": {"../secret": ENTRY}}, "a path inside the folder"),
+    ({"files": {radiance_name(0, 1): ENTRY}}, f"files: {radiance_name(0, 0)} is missing"),
+    ({"packed": ["truth.zarr/zarr.json"]}, "files: arrays.zip is missing"),
 ]
 
 
@@ -109,6 +111,15 @@ def test_a_wrong_or_absent_member_of_a_manifest_is_named(tmp_path, members, word
     root = make_dataset(tmp_path / "d")
     rewrite_manifest(root, **members)
     assert words in one_sentence(lambda: open_dataset(root), root / MANIFEST)
+
+
+def test_an_archive_that_is_none_is_refused(tmp_path):
+    root = make_dataset(tmp_path / "d")
+    (root / "arrays.zip").write_bytes(b"PK")
+    packed = [f"{COUNTS}/dense/zarr.json"]
+    rewrite_manifest(root, packed=packed, files=list_files(root, ["arrays.zip"]))
+    dataset = open_dataset(root)
+    assert "cannot be read" in one_sentence(lambda: dataset.counts, root / "arrays.zip")
 
 
 def test_radiance_of_another_size_is_refused(tmp_path):

@@ -192,8 +192,9 @@ def test_rates_of_a_range_of_frames_are_those_of_its_bits(span: tuple[int, int])
         else:
             with pytest.raises(InputError, match="only the sums over all 12 frames"):
                 sums.rate(k, l, frames=span)
-    with pytest.raises(InputError, match="first < end <= 12"):
-        counts.rate(0, 0, frames=(span[0], 13))
+    for frames in ((span[0], 13), 5, (0, 1.5)):
+        with pytest.raises(InputError, match="first < end <= 12"):
+            counts.rate(0, 0, frames=frames)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
