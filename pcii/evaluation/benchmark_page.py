@@ -82,11 +82,7 @@ def write_page(folder: Path, out: Path) -> int:
             for measure in summary.AXES
             if measure in {*cell_means["measure"]}
         },
-        "ranks": {
-            f"{title} over all {unit}": summary.rank_table(summary.ranks(of_scenes, measure), unit)
-            for measure, title in summary.DECISIVE.items()
-            for unit in [summary.ranked_over(of_scenes, measure)]
-        },
+        "ranks": dict(_ranks(of_scenes, measure) for measure in summary.DECISIVE),
         "machines": {
             machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))
         },
@@ -94,6 +90,13 @@ def write_page(folder: Path, out: Path) -> int:
     }
     write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
+
+
+def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
+    """Title and table of the methods ranked by one measure."""
+    unit = summary.ranked_over(frame, measure)
+    table = summary.rank_table(summary.ranks(frame, measure), unit)
+    return f"{summary.DECISIVE[measure]} over all {unit}", table
 
 
 def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:

@@ -313,12 +313,12 @@ def _read_arrays(file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str,
     described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
     try:
         with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except Exception as fault:  # damaged archives raise various exceptions
-        raise InputError(f"{file}: no .npz file of numbers, as numpy.savez writes it ({fault})") from None
-    is_right = {
-        name: array.shape == shapes.get(name) and array.dtype.kind in "fiub" for name, array in arrays.items()
-    }
-    if first not in arrays or not all(is_right.values()):
+            arrays = {name: np.asarray(archive[name]) for name in archive.files}  # what is no array is bytes
+    except Exception:  # damaged archives raise various exceptions, whose advice is to trust the file
+        raise InputError(f"{file}: damaged, or no .npz file of numbers as numpy.savez writes it") from None
+    is_right = (
+        array.shape == shapes.get(name) and array.dtype.kind in "fiub" for name, array in arrays.items()
+    )
+    if first not in arrays or not all(is_right):
         raise InputError(f"{file}: expected numbers {described}, of which {first} is needed")
     return arrays

@@ -6,6 +6,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pandas as pd
@@ -71,9 +72,10 @@ FAULTS: dict[str, tuple[Change, str]] = {
         "in_focus: expected 0 and 1",
     ),
     "another size": (lambda f: np.savez(f / DEPTH, z_mm=np.ones((66, 7))), NUMBERS),
-    "objects": (depth(None), "depth.npz: no .npz file of numbers, as .*allow_pickle=False"),
+    "objects": (depth(None), "depth.npz: damaged, or no .npz file of numbers as numpy.savez writes it$"),
+    "no array": (lambda f: ZipFile(f / DEPTH, "w").writestr("z_mm", "1"), NUMBERS),
     "below 0": (depth(-1.0), "z_mm: expected 0.001 to 1e.12 mm"),
-    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: no .npz file of numbers, as"),
+    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: damaged, or no .npz file of numbers"),
     "elsewhere": (
         lambda f: (f / DEPTH).symlink_to((f / DEPTH).rename(f.parent / "x")),
         "depth.npz: is no result of this half, or a link out of the folder; expected files DATASET",
