@@ -192,8 +192,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
 
     labels = _labels(rows)
     records = [
-        {"scene": labels[row["title"], row["recipe"]]}
-        | {"light": "by exposure" if row["budget"] is None else row["budget"]}
+        {
+            "scene": labels[row["title"], row["recipe"]],
+            "light": "by exposure" if row["budget"] is None else row["budget"],
+        }
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
