@@ -12,6 +12,8 @@ UNSEEN = re.compile(
     "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
 )
 """Control characters, ends of lines, marks of writing direction, surrogates, and what is no character."""
+BLANK = re.compile("[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\ufe00-\ufe0f\U000e0100-\U000e01ef]")
+"""Letters, marks and symbols of Unicode that are drawn as nothing, or choose how the one before is drawn."""
 MARKDOWN = re.compile(r"[\\`*\[\]|~$#]|(?<![^\W_])_|_(?![^\W_])")
 """Characters with a meaning in Markdown; an underscore has one only at the ends of words."""
 OF_ADDRESSES = "%/:?#[]@!$&'()*+,;=~"
@@ -88,7 +90,8 @@ def is_plain(text: str) -> bool:
     >>> is_plain("Größe 2"), is_plain("two  blanks"), is_plain("\uff4dine"), is_plain("mi\u200bne")
     (True, False, False, False)
     """
-    return text == " ".join(unicodedata.normalize("NFKC", text).split()) and text.isprintable()
+    in_normal_form = " ".join(unicodedata.normalize("NFKC", text).split())
+    return text == in_normal_form and text.isprintable() and not BLANK.search(text)
 
 
 def in_markdown(text: str) -> str:

@@ -145,18 +145,27 @@ def _swept(
             nearby[:, better] = np.stack([last, current, nothing])[:, better]
             best[better] = plane
             last, least = current, np.minimum(least, current)
-    # The top of a parabola through the best plane and two neighbours, at most half a step away.
-    inner, (before, at, after) = np.isfinite(nearby).all(axis=0), nearby
-    with np.errstate(invalid="ignore"):
-        curvature = np.where(inner, before - 2 * at + after, 0.0)
-        slope = np.where(inner, before - after, 0.0)
-    offset = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
     total_px = planes.total_disparity_px
-    best_px = total_px[best] + np.clip(offset, -0.5, 0.5) * (total_px[1] - total_px[0])
+    best_px = total_px[best] + _steps_to_peak(nearby) * (total_px[1] - total_px[0])
     # Where all planes are alike there is nothing to choose from.
     depth = np.where(nearby[1] > least, depth_of_total_disparity_mm(planes.grid, best_px), np.nan)
     depth = on_pixels(depth, side, data.grid.shape_HW)
     return DepthMap(depth, np.isfinite(depth).astype(np.float64))
+
+
+def _steps_to_peak(nearby: np.ndarray) -> np.ndarray:
+    """Steps (h, w), at most half of one, from the best plane to the top of a parabola through its measure.
+
+    `nearby` (3, h, w) is the measure at the plane before, at it and after it; beyond the ends it is not
+    finite, and there is no step.
+    """
+    before, at, after = nearby
+    inner = np.isfinite(nearby).all(axis=0)
+    with np.errstate(invalid="ignore"):
+        curvature = np.where(inner, before - 2 * at + after, 0.0)
+        slope = np.where(inner, before - after, 0.0)
+    steps = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
+    return np.clip(steps, -0.5, 0.5)
 
 
 def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:

@@ -20,7 +20,7 @@ from pcii.evaluation.evaluation_page import accuracy_plot
 from pcii.evaluation.method_names import estimator_of, known_methods
 from pcii.evaluation.rows import Row, frame_of, read_rows
 from pcii.figures import NOT_KNOWN, render_page, text_table
-from pcii.store import IN_FRAMES, verify
+from pcii.store import IN_FRAMES, ROWS, verify
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -37,11 +37,14 @@ BOUND = "bound for whole objects (Cramér-Rao)"
 def write_page(folder: Path, out: Path) -> int:
     """Write the page of all submissions in a folder, each a folder in it; returns how many there are.
 
-    Raises `InputError` for a folder without submissions, one that is not scored or was changed since, two of
-    one name, and submissions of several benchmarks.
+    Raises `InputError` for a folder without submissions, one that is not scored, was changed since or holds
+    links, two of one name, scores of a method that a submission does not name, and submissions of several
+    benchmarks.
     """
     submissions: dict[Path, ScoredSubmission] = {}
     for file in sorted(folder.glob(f"*/{SUBMISSION}")):
+        if links := sorted(each for each in file.parent.iterdir() if each.is_symlink()):
+            raise InputError(f"{links[0]}: is a link; a folder of scores holds its files themselves")
         verify(file.parent)
         submissions[file.parent] = read_submission(file.parent, ScoredSubmission)
     if not submissions:
@@ -58,7 +61,12 @@ def write_page(folder: Path, out: Path) -> int:
             if other != inside:
                 names = f"{other.name} and {inside.name}"
                 raise InputError(f"{folder}: {names} are both of {about.method!r}, in upper or lower case")
-        rows += by_scene(read_rows(inside))
+        rows_of_submission = by_scene(read_rows(inside))
+        if others := {row["method"] for row in rows_of_submission}.difference(about.methods):
+            raise InputError(
+                f"{inside / ROWS}: has rows of {min(others)!r}, which {SUBMISSION} does not name"
+            )
+        rows += rows_of_submission
     frame = summary.with_yardsticks(frame_of(rows))
     # Binary frames of a scene are the same photons: they would count it twice.
     of_scenes = frame[~frame["scene"].astype(str).str.endswith(IN_FRAMES)]
@@ -74,11 +82,7 @@ def write_page(folder: Path, out: Path) -> int:
             for measure in summary.AXES
             if measure in {*cell_means["measure"]}
         },
-        "ranks": {
-            f"{title} over all {unit}": summary.rank_table(summary.ranks(of_scenes, measure), unit)
-            for measure, title in summary.DECISIVE.items()
-            for unit in [summary.ranked_over(of_scenes, measure)]
-        },
+        "ranks": dict(_ranks(of_scenes, measure) for measure in summary.DECISIVE),
         "machines": {
             machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))
         },
@@ -86,6 +90,13 @@ def write_page(folder: Path, out: Path) -> int:
     }
     write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
+
+
+def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
+    """Title and table of the methods ranked by one measure."""
+    unit = summary.ranked_over(frame, measure)
+    table = summary.rank_table(summary.ranks(frame, measure), unit)
+    return f"{summary.DECISIVE[measure]} over all {unit}", table
 
 
 def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:

@@ -55,7 +55,7 @@ AnySubmission = TypeVar("AnySubmission", bound="Submission")
 class Submission(BaseModel):
     """What submission.json says: the benchmark, the name of the method, and more if its authors like.
 
-    The name is without `depth:`, and new for masks and for depth.
+    The name is without `depth:`, and new for masks and for depth. The page shows `url` as text, no link.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -63,14 +63,14 @@ class Submission(BaseModel):
     benchmark: Text
     method: Text
     authors: Text | None = None
-    url: Text | None = None
+    url: Annotated[str, StringConstraints(pattern="^https?://")] | None = None
     description: Text | None = None
     trained_on: Text | None = None
 
     @property
     def is_run(self) -> bool:
         """Whether the method was run here, and its maps not made elsewhere."""
-        return isinstance(self, ScoredSubmission) and self.made == RUN
+        return False
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -90,6 +90,11 @@ class ScoredSubmission(Submission):
     made: Made
     command_name: Text | None = None
     half: Half
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return self.made == RUN
 
 
 @dataclass(frozen=True)
@@ -233,8 +238,8 @@ def by_scene(rows: Sequence[Row]) -> list[Row]:
 def read_submission(folder: Path, model: type[AnySubmission]) -> AnySubmission:
     """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
     file, expected = folder / SUBMISSION, f"expected a JSON object of {', '.join(model.model_fields)}"
-    if not file.is_file():
-        raise InputError(f"{file}: missing; {expected}")
+    if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f"{file}: missing, or a link out of the folder; {expected}")
     try:
         return model.model_validate_json(file.read_bytes())
     except ValidationError as fault:
@@ -308,12 +313,12 @@ def _read_arrays(file: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str,
     described = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
     try:
         with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except Exception as fault:  # damaged archives raise various exceptions
-        raise InputError(f"{file}: no .npz file of numbers, as numpy.savez writes it ({fault})") from None
-    is_right = {
-        name: array.shape == shapes.get(name) and array.dtype.kind in "fiub" for name, array in arrays.items()
-    }
-    if first not in arrays or not all(is_right.values()):
+            arrays = {name: np.asarray(archive[name]) for name in archive.files}  # what is no array is bytes
+    except Exception:  # damaged archives raise various exceptions, whose advice is to trust the file
+        raise InputError(f"{file}: damaged, or no .npz file of numbers as numpy.savez writes it") from None
+    is_right = (
+        array.shape == shapes.get(name) and array.dtype.kind in "fiub" for name, array in arrays.items()
+    )
+    if first not in arrays or not all(is_right):
         raise InputError(f"{file}: expected numbers {described}, of which {first} is needed")
     return arrays

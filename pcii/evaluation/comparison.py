@@ -220,23 +220,8 @@ def tasks_of(
             for method in methods or _methods_for(dataset, light, z_mm)
             if method.takes(full_light=light == FULL_LIGHT)
         ]
-        names = {task.method.name for task in tasks_of_dataset}
-        for method in methods:
-            if method.name not in names:
-                takes_counts = method.takes(full_light=False)
-                kinds = ("photon counts", "radiance") if takes_counts else ("radiance", "photon counts")
-                raise InputError(
-                    f"method: {method.name!r} needs {kinds[0]}, and of {dataset.path} {kinds[1]} would be "
-                    f"scored; use {', '.join(methods_for(full_light=takes_counts))}"
-                )
-        of_depth = [estimator_of(name) is not None for name in names]
-        if z_mm or not all(of_depth):
-            planes_of(dataset, z_mm)
-        try:
-            if any(of_depth):
-                check_range_mm(dataset.grid, depth_range_of(dataset, z_mm))
-        except InputError as fault:
-            raise InputError(f"{dataset.path}: {fault}") from None
+        _check_methods(dataset, methods, tasks_of_dataset)
+        _check_depths(dataset, tasks_of_dataset, z_mm)
         tasks.setdefault(identity_of(dataset.manifest), tasks_of_dataset)
     return [task for tasks_of_dataset in tasks.values() for task in tasks_of_dataset]
 
@@ -246,6 +231,31 @@ def _methods_for(dataset: Dataset, light: Light, z_mm: Sequence[float]) -> list[
     has_planes = has_depths(dataset, z_mm)
     names = methods_for(full_light=light == FULL_LIGHT)
     return [NamedMethod(name) for name in names if has_planes or estimator_of(name)]
+
+
+def _check_methods(dataset: Dataset, methods: Sequence[NamedMethod], tasks: Sequence[Task]) -> None:
+    """Raise `InputError` for a named method that has no task, since it cannot take the data."""
+    names = {task.method.name for task in tasks}
+    for method in methods:
+        if method.name not in names:
+            takes_counts = method.takes(full_light=False)
+            need, offer = ("photon counts", "radiance") if takes_counts else ("radiance", "photon counts")
+            raise InputError(
+                f"method: {method.name!r} needs {need}, and of {dataset.path} {offer} would be scored; use "
+                f"{', '.join(methods_for(full_light=takes_counts))}"
+            )
+
+
+def _check_depths(dataset: Dataset, tasks: Sequence[Task], z_mm: Sequence[float]) -> None:
+    """Raise `InputError` if methods need depths and none are named, or if they cannot be searched."""
+    of_depth = [estimator_of(task.method.name) is not None for task in tasks]
+    if z_mm or not all(of_depth):
+        planes_of(dataset, z_mm)
+    if any(of_depth):
+        try:
+            check_range_mm(dataset.grid, depth_range_of(dataset, z_mm))
+        except InputError as fault:
+            raise InputError(f"{dataset.path}: {fault}") from None
 
 
 def identity_of(manifest: "DatasetManifest") -> str:
@@ -316,21 +326,26 @@ class EvaluationJob:
     def __init__(self, tasks: Sequence[Task], full_light: Mapping[str, Dataset] | None = None) -> None:
         self.tasks, self.full_light = tasks, full_light or {}
         self._warm: set[tuple[Light, str]] = set()
+        self._software: dict[str, dict[str, str] | None] = {}
+        """By method: that of this process, which may be on another machine, when it first runs the method."""
         self._full_light_sections: tuple[str, Sections] | None = None
         """Identity of the last dataset with bounds, and the sections of its radiance."""
 
     def __call__(self, piece: int) -> Row:
         """The row of a task; raises `InputError` for a dataset that is damaged."""
         task = self.tasks[piece]
+        name = task.method.name
+        if name not in self._software:
+            self._software[name] = software_of(task.method)
         data = task.dataset.at_light(task.light)  # opened anew, so that tasks keep nothing in memory
         images, truth = data.counts_or_views, data.truth
         seconds, estimate = self.estimate(task, data)
         row = _dataset_fields(data, task.z_mm) | {
             "budget": task.light.stored,
             "photons_per_view": data.counts.total / data.grid.view_count if data.has_counts else None,
-            "method": task.method.name,
+            "method": name,
             "seconds": None if seconds is None else round(seconds, 6),
-            "software": software_of(task.method),
+            "software": self._software[name],
             "date": f"{datetime.now(UTC):%Y-%m-%d}",
             "machine": machine(),
         }
@@ -338,7 +353,7 @@ class EvaluationJob:
             depth = dict(score(None, estimate, truth, grid=data.grid).depth)
             return row | {"depth": depth} | self._bound(task, data, images)
         result = score(estimate, None, truth)
-        planes = [{name: plane[name] for name in plane if name != "method"} for plane in result.planes]
+        planes = [{key: plane[key] for key in plane if key != "method"} for plane in result.planes]
         return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 
     def estimate(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:

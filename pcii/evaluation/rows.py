@@ -41,6 +41,14 @@ def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield f"{prefix}{name}", value
 
 
+def _measures(scores: Any) -> Any:
+    """Scores by their dotted names; raises ValueError for a name of another column of the frame."""
+    measures = dict(leaves(scores)) if isinstance(scores, dict) else {}
+    if names := {*HEAD} & measures.keys():
+        raise ValueError(f"{min(names)!r} is no name of a measure")
+    return measures or scores
+
+
 def _plane_parts(plane: Mapping[str, Any]) -> Row:
     """A plane with its scores as one member."""
     scores = dict(plane)
@@ -56,8 +64,7 @@ def _row_model() -> "TypeAdapter[Any]":
 
     from pcii.store import OPEN, Text
 
-    is_not_negative = Field(ge=0)
-    by_names = BeforeValidator(lambda scores: dict(leaves(scores)) if isinstance(scores, dict) else scores)
+    is_not_negative, by_names = Field(ge=0), BeforeValidator(_measures)
 
     class Plane(TypedDict):
         __pydantic_config__ = OPEN  # type: ignore[misc]
@@ -146,6 +153,8 @@ def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
         try:
             row = json.loads(line)
             _row_model().validate_python(row)
+            if not (row.get("depth") or row.get("planes")):
+                raise ValueError("no scores")
             rows[key_of(row)] = row
         except (ValueError, TypeError, RecursionError) as fault:
             sentence = first_fault(fault) if isinstance(fault, ValidationError) else "is no row of scores"
@@ -183,8 +192,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
 
     labels = _labels(rows)
     records = [
-        {"scene": labels[row["title"], row["recipe"]]}
-        | {"light": "by exposure" if row["budget"] is None else row["budget"]}
+        {
+            "scene": labels[row["title"], row["recipe"]],
+            "light": "by exposure" if row["budget"] is None else row["budget"],
+        }
         | {name: row.get(name) for name in ("method", "dataset", "seed", "identity", "recipe")}
         | {"z_mm": None, "objects": None}
         | {name: row.get(name) for name in ("photons_per_view", "seconds")}
@@ -214,7 +225,7 @@ def _measured(row: Row) -> Iterable[Row]:
     if "depth" in row:
         return [dict(leaves(row["depth"])) | {name: row[name] for name in ("bound_px",) if name in row}]
     records: dict[float, Row] = {}
-    for plane in row.get("planes", ()):
+    for plane in row["planes"]:
         record = records.setdefault(plane["z_mm"], {"z_mm": plane["z_mm"], "objects": None})
         scores = dict(leaves(_plane_parts(plane)["scores"]))
         if plane["truth"] == "object":

@@ -211,8 +211,12 @@ def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
     plane, off_px = focus.blur_px.argmin(axis=0), 2 * focus.blur_px.min(axis=0)
     reach_px = np.diff(np.sort(total_disparity_px(planes.grid, planes.z_mm))).max() / 2
     is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (off_px <= reach_px)
-    fields = {"z_mm": truth.z_mm.astype(np.float32), "object_id": truth.object_id.astype(np.int16)}
-    return fields | {"in_focus": focus.by_pixel, "plane": np.where(is_known, plane, -1).astype(np.int64)}
+    return {
+        "z_mm": truth.z_mm.astype(np.float32),
+        "object_id": truth.object_id.astype(np.int16),
+        "in_focus": focus.by_pixel,
+        "plane": np.where(is_known, plane, -1).astype(np.int64),
+    }
 
 
 def _of_split(

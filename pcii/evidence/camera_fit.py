@@ -30,7 +30,7 @@ from pcii.types import (
 MAX_CAMERAS = 5
 """Largest number of camera rows, and of columns, that are used: first, last, and equally spread between."""
 MAX_CELLS = 128
-"""Largest side of the views in cells, to try orders; depths are placed by cells of a quarter of the size."""
+"""Largest side of the views in cells, to try orders; depths are placed with four times as many."""
 RANGE_FACTOR = 4.0
 """How far beyond a stated range depths are looked at, as a factor of parallax: ranges are stated roughly."""
 
@@ -40,24 +40,26 @@ PHOTONS_PER_CELL = 4.0
 BLUR_CELLS, BACKGROUND_CELLS = 0.7, 8.0
 """Standard deviations of the band that views are limited to: half cells do not matter, nor vignetting."""
 WINDOW_CELLS, MIN_SHARE = 5, 0.6
-"""Side of the window over which the variance is averaged, a third of the smallest side of views that are
-judged; share of the views that have to reach a cell, and of the cells that have to be reached in a window:
-more than half."""
+"""Side of the window over which the variance is averaged; share of the views that have to reach a cell, and
+of the cells that have to be reached in a window: more than half. A larger window averages away more noise,
+and more of what is small. Views of less than three windows are not judged."""
 
-# What decides. If a share of the variance is larger, noise decides; if smaller, wrong views pass, as
-# tests/pcii/evidence/test_camera_fit.py keeps it.
+# What decides, set by hand so that right views are not warned about and wrong ones are, as
+# tests/pcii/evidence/test_camera_fit.py keeps it. If a share of the variance is larger, noise decides.
 BETTER = 0.75
 """An order is better than others if at most this share of their variance remains."""
 SHARP = 0.5
 """At a surface the variance is at most this share of its mean over the planes."""
 CHANCE_SHARE = 0.02
-"""Share of the cells that are sharp by chance, and of what is sharp that chance puts behind a shear.
-If it is smaller, noise is taken for surfaces and single cells make the shear larger; if larger, small things
-are not seen."""
+"""Share of the cells that are sharp by chance, and of what is sharp that the advised shear leaves behind the
+cameras. If it is smaller, noise is taken for surfaces, and single cells make the shear larger; if larger,
+small things are not seen, and the shear leaves more behind the cameras."""
+MAX_BEHIND_SHARE = 0.12
+"""Largest share of what is sharp that may lie behind the cameras without a warning. If it is smaller, chance,
+which puts some there, makes warnings; if larger, shears of which little lies behind are not warned about."""
 MAX_DEPTHS, MIN_DEPTH_SHARE = 4, 0.08
-"""Of depths that are proposed, those that a report has room for; least share of all surfaces around one, and
-of what is sharp behind the cameras for a warning. If it is smaller, chance makes depths and warnings; if
-larger, small surfaces are left out."""
+"""Largest number of depths that are proposed, as many as a report has room for; least share of all surfaces
+that lie around each. If the share is smaller, chance makes depths; if larger, small surfaces are left out."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ def check_grid(
         return fit
     fit = replace(fit, order=None if best == order else best)
     mass = _by_plane(variance, sharpness * is_sharp)
-    if mass[total_px < -side].sum() > MIN_DEPTH_SHARE:
+    if mass[total_px < -side].sum() > MAX_BEHIND_SHARE:
         return _in_front(fit, best, grids[best], mass, shifts_px, side)
     if fit.order is not None:
         return fit
@@ -128,7 +130,7 @@ def _in_front(
 ) -> CameraFit:
     """The fit of views in which much is sharp behind the cameras: the order or the shear that mends it."""
     is_behind = _still_px(grid) - shifts_px < -side  # of views whose two axes are turned
-    if mass[is_behind].sum() <= MIN_DEPTH_SHARE and not is_behind[_peaks(mass)].any():
+    if mass[is_behind].sum() <= MAX_BEHIND_SHARE and not is_behind[_peaks(mass)].any():
         rows, cols = order.flip_rows ^ (grid.rows > 1), order.flip_cols ^ (grid.cols > 1)
         return replace(fit, order=replace(order, flip_rows=rows, flip_cols=cols))
     least_px = float(shifts_px[np.searchsorted(mass.cumsum(), CHANCE_SHARE)])

@@ -264,8 +264,11 @@ def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":
 
 def _line_style(number: int) -> dict[str, Any]:
     """Colour, marker and line of a method by its number."""
-    looks = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
-    return looks | {"linestyle": "-" if number < len(COLOURS) else "--"}
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "marker": MARKERS[number % len(MARKERS)],
+        "linestyle": "-" if number < len(COLOURS) else "--",
+    }
 
 
 def _add_legend(figure: "Figure", handles: Mapping[str, Any], columns: int) -> None:

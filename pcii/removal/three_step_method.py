@@ -51,7 +51,11 @@ NEARBY_PX = 25
 BLUR_SHARE = 1 / 3
 """A pixel below 1/3 of the brightest nearby (1/9 of its photons) may be part of the blur of that one."""
 EDGE_SMOOTHING_PX = 1.0
+"""Standard deviation by which edges are smoothed. If it is smaller, noise makes ridges of its own; if larger,
+outlines are rounded."""
 SMALLEST_REGION_PX = 100
+"""Regions and holes of fewer pixels are left out. If it is smaller, noise leaves specks; if larger, small
+objects are lost."""
 BORDER_BITS = 0.1
 """Least gain in entropy, in bits per window of border, for which neighbouring regions get different
 planes."""
@@ -112,14 +116,14 @@ class ThreeStep:
         images = (brightness(sections, plane, window_px) for plane in range(len(planes)))
         edges = np.stack([roberts_magnitude(image).astype(np.float32) for image in images])
         del sections  # whose probe planes take memory: the masks are of the requested ones
-        smooth = _ridges(edges)
+        ridges = _ridges(edges)
         fine = np.stack([self._bright(counts, requested, p, window_px) for p in requested_planes])
         bright = _half_of_each_pixel(fine, self.subpixel)
         bright_at_any: np.ndarray = np.logical_or.reduce(bright)
         margin = int(LARGEST_BLUR_PX)
-        strongest = smooth[: len(bright)].max(axis=0)
+        highest_ridges = ridges[: len(bright)].max(axis=0)
         if self.boundary:
-            regions = pieces_along_ridges(bright_at_any, strongest, margin**2)
+            regions = pieces_along_ridges(bright_at_any, highest_ridges, margin**2)
         else:
             regions = _tiles(bright_at_any, 2 * margin)
         steps |= {
@@ -132,15 +136,9 @@ class ThreeStep:
         if self.threshold:
             in_focus &= steps["kept"]
         if self.entropy:
-            entropies = _edge_entropies(smooth, regions, margin)
-            if self.boundary:
-                windows = np.bincount(regions.ravel(), minlength=len(entropies)) / window_px**2
-                cost, border_cost = windows[:, None] * entropies, BORDER_BITS / window_px
-                best = cheapest_planes(regions, strongest, cost, border_cost)
-            else:
-                best = np.argmin(entropies, axis=1)
-                best[0] = -1
-            winner = best[regions]
+            entropies = _edge_entropies(ridges, regions, margin)
+            borders = highest_ridges if self.boundary else None
+            winner = _planes_of_least_entropy(entropies, regions, borders, window_px)[regions]
             in_focus &= winner == np.arange(len(bright))[:, None, None]
             steps["entropy"] = entropies.T[: len(bright)][:, regions]
             steps["winner"] = np.broadcast_to(winner, bright.shape)
@@ -335,3 +333,20 @@ def _edge_entropies(edges: np.ndarray, regions: np.ndarray, margin_px: int) -> n
         nats = np.log(np.maximum(total, 1e-300)) - weighted / np.maximum(total, 1e-300)
         entropies[number] = np.where(total > 0, nats, np.log(grown.sum())) / np.log(2)
     return entropies
+
+
+def _planes_of_least_entropy(
+    entropies: np.ndarray, regions: np.ndarray, ridges: np.ndarray | None, window_px: int
+) -> np.ndarray:
+    """Plane at which each region is in focus, (N + 1,) int64; -1 for number 0.
+
+    Minimises the sum over regions of entropy times independent windows of `window_px`, plus `BORDER_BITS` for
+    each window of border, along the `ridges` (H, W), between regions of different planes. Without `ridges`
+    each region has the plane of its least entropy.
+    """
+    if ridges is None:
+        planes = np.argmin(entropies, axis=1)
+        planes[0] = -1
+        return planes
+    windows = np.bincount(regions.ravel(), minlength=len(entropies)) / window_px**2
+    return cheapest_planes(regions, ridges, windows[:, None] * entropies, BORDER_BITS / window_px)

@@ -212,7 +212,7 @@ def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path:
 MISNAMED: list[tuple[list[Any], str]] = [
     ([by_count, ("by_count", two_rows)], "methods: 'by_count' is there twice"),
     ([("three-step", by_count)], "methods: the name 'three-step' is taken"),
-    ([("(nothing)", by_count)], r"methods: expected a name of letters .*, got '\(nothing\)'"),
+    ([("(nothing)", by_count)], r"methods: expected a name of characters .*, got '\(nothing\)'"),
     (["guess"], "method: there is no method named 'guess'; use depth, .*, depth:sweep-17"),
 ]
 

@@ -6,6 +6,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pandas as pd
@@ -71,9 +72,10 @@ FAULTS: dict[str, tuple[Change, str]] = {
         "in_focus: expected 0 and 1",
     ),
     "another size": (lambda f: np.savez(f / DEPTH, z_mm=np.ones((66, 7))), NUMBERS),
-    "objects": (depth(None), "depth.npz: no .npz file of numbers, as .*allow_pickle=False"),
+    "objects": (depth(None), "depth.npz: damaged, or no .npz file of numbers as numpy.savez writes it$"),
+    "no array": (lambda f: ZipFile(f / DEPTH, "w").writestr("z_mm", "1"), NUMBERS),
     "below 0": (depth(-1.0), "z_mm: expected 0.001 to 1e.12 mm"),
-    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: no .npz file of numbers, as"),
+    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: damaged, or no .npz file of numbers"),
     "elsewhere": (
         lambda f: (f / DEPTH).symlink_to((f / DEPTH).rename(f.parent / "x")),
         "depth.npz: is no result of this half, or a link out of the folder; expected files DATASET",
@@ -84,6 +86,12 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a row": (edit(ROWS, '"iou": 0', '"iou": 1', lists=False), f"{ROWS}.*; .* make or score it again"),
     "no list": (lambda f: (f / "evaluation.json").unlink(), "theirs: not a finished evaluation"),
     "text": (edit(ROWS, '"iou": [0-9.]+', '"iou": "0.5"'), "line 1: planes.0.scores.iou: .* a valid number"),
+    "a column's name": (edit(ROWS, '"iou"', '"method"'), "line 1: planes.0.scores: 'method' is no name"),
+    "no scores": (edit(ROWS, '"planes"', '"other"'), "line 1: is no row of scores"),
+    "a link": (
+        lambda f: (f / ROWS).symlink_to((f / ROWS).rename(f.parent / "x")),
+        f"{ROWS}: is a link; a folder of scores holds its files themselves",
+    ),
 }
 
 
@@ -239,13 +247,15 @@ def about(folder: Path, **members: str) -> Path:
 
 def test_names_are_of_any_language_and_none_is_taken_for_another(tmp_path: Path) -> None:
     says = f"{SUBMISSION}: method: (expected a name of characters|the name '.*' is taken; choose another one)"
-    for name in ("(nothing)", "Brightness", "depth:net", "my\u200bnet", "my  net", "\uff4eet"):
+    for name in ("(nothing)", "Brightness", "depth:net", "my\u200bnet", "my  net", "\uff4eet", "net\u2800"):
         with pytest.raises(InputError, match=says):
             read_submission(about(tmp_path, method=name), Submission)
     for name in ("Größe 2.1", "β-net, 3rd try", "深層ネット", "U-Net + CRF"):
         assert read_submission(about(tmp_path, method=name), Submission).methods == (f"depth:{name}", name)
     good = {"authors": "José O’Brien & 李明", "url": "https://example.org/a?b=c#d"}
     assert read_submission(about(tmp_path, **good), Submission).model_dump().items() >= good.items()
+    with pytest.raises(InputError, match=f"{SUBMISSION}: url: .* '.https"):
+        read_submission(about(tmp_path, url="javascript:x"), Submission)
 
 
 def test_a_page_has_each_name_once_whatever_its_case(scored: Evaluation, tmp_path: Path) -> None:
@@ -253,4 +263,7 @@ def test_a_page_has_each_name_once_whatever_its_case(scored: Evaluation, tmp_pat
         shutil.copytree(scored.folder, tmp_path / folder)
         edit(SUBMISSION, '"method": "mine"', f'"method": "{name}"')(tmp_path / folder)
     with pytest.raises(InputError, match=r"ours and theirs are both of 'Mine', in upper or lower case$"):
+        write_page(tmp_path, tmp_path / "page.html")
+    edit(SUBMISSION, '"Mine"', '"yours"')(tmp_path / "theirs")
+    with pytest.raises(InputError, match=r"rows\.jsonl: has rows of '.*mine', which submission.json"):
         write_page(tmp_path, tmp_path / "page.html")
