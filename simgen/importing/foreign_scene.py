@@ -128,6 +128,8 @@ class MeshScene(ForeignScene):
         try:
             for name, mesh, material in self._read():
                 self.parts.append(Part(name, Y_UP if is_z_up else np.eye(4), mesh, name, material))
+        except InputError:  # names its file
+            raise
         except ValueError as fault:
             raise InputError(f"{path}: this file {shorten(str(fault))}") from None
         except OSError as fault:

@@ -95,10 +95,8 @@ class SceneLights:
             pose = np.array(pose_of(self.mi, thing).matrix, dtype=np.float64)
             triangles, ball = solid_parts(shape, thing.material, self.assets), None
             if isinstance(shape, Sphere):
-                triangles, ball = (
-                    globe(shape.radius_mm, BALL_ROWS),
-                    (pose[:3, 3], shape.radius_mm, pose[:3, :3]),
-                )
+                triangles = globe(shape.radius_mm, BALL_ROWS)
+                ball = pose[:3, 3], shape.radius_mm, pose[:3, :3]
             own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
             picture, texcoords = None, None
             if emission.texture is not None:
@@ -146,26 +144,19 @@ class SceneLights:
                 return {"type": "constant", "radiance": bright(light.luminance_cd_m2)}
             case lights.PointLight():
                 position = frame.points(np.array(light.position_mm)).tolist()
-                return {
-                    "type": "point",
-                    "position": position,
-                    "intensity": bright(light.intensity_cd, per_cd),
-                }
+                intensity = bright(light.intensity_cd, per_cd)
+                return {"type": "point", "position": position, "intensity": intensity}
             case lights.SpotLight() if light.cutoff_deg < NARROW_DEG:
                 return _narrow_spot(mi, light, gain * per_cd, T(frame.rigid_pose(_lamp_pose(light))))
             case lights.SpotLight():
                 angles = {"beam_width": light.beam_deg, "cutoff_angle": light.cutoff_deg}
-                to_world, intensity = (
-                    T(frame.rigid_pose(_lamp_pose(light))),
-                    bright(light.intensity_cd, per_cd),
-                )
+                to_world = T(frame.rigid_pose(_lamp_pose(light)))
+                intensity = bright(light.intensity_cd, per_cd)
                 return {"type": "spot", "to_world": to_world, "intensity": intensity} | angles
             case lights.DirectionalLight():
-                direction, irradiance = (
-                    frame.directions(np.array(light.direction)),
-                    bright(light.illuminance_lux),
-                )
-                return {"type": "directional", "direction": direction.tolist(), "irradiance": irradiance}
+                direction = frame.directions(np.array(light.direction)).tolist()
+                irradiance = bright(light.illuminance_lux)
+                return {"type": "directional", "direction": direction, "irradiance": irradiance}
             case lights.EnvironmentLight():
                 bitmap = linear_bitmap(mi, np.ascontiguousarray(self.surroundings, dtype=np.float32))
                 # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z

@@ -16,8 +16,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base import InputError
 from simgen.base import AssetName, Length, Position, Strict, asset, shown_value
 
-MAX_INCLUDES = 100
-"""Files within files at most: more are a circle."""
+MAX_DEPTH = 100
+"""Elements within elements at most, of included files too. Mitsuba goes a call deeper for each, and crashes
+where the stack ends; files that include each other would have no end."""
 ASCII_AND_MORE = re.compile(r"latin-?1|iso-8859-\d+|windows-125\d", re.IGNORECASE)
 """Encodings that are read if all characters are ASCII, which are the same in UTF-8."""
 OF_RECIPES = {
@@ -76,8 +77,9 @@ class MitsubaXml:
     """What one pass over a Mitsuba scene `name` in a folder, and over what it includes, finds there.
 
     `files` are the files that it reads, itself left out, relative to the folder; `unused` is what recipes
-    have instead, with its parameters. Raises `InputError` that names file and line: for what is not XML, for
-    entities, for a plugin that is no plain name, for files that are missing or outside the folder.
+    have instead, with its parameters. Raises `InputError` that names file and line: for what is not XML or
+    too deep, for entities, for a plugin that is no plain name, for files that are missing or outside the
+    folder.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -88,9 +90,9 @@ class MitsubaXml:
         parts = [f"{what} ({', '.join(values)})" if values else what for what, values in self._of_recipes]
         self.unused = tuple(dict.fromkeys(parts))
 
-    def _read(self, name: str, folders: tuple[PurePosixPath, ...] = ()) -> list[str]:
+    def _read(self, name: str, folders: tuple[PurePosixPath, ...] = (), depth: int = 0) -> list[str]:
         """Names of the files that a file names; `folders` are those of the files that include it, from the
-        last one to the first."""
+        last one to the first, and `depth` is the number of elements around it."""
         path = asset(self._folder, name, "mitsuba")
         names, data, parents = list[str](), path.read_bytes(), list[list[str] | None]()
         own_folder = PurePosixPath(name).parent
@@ -109,6 +111,8 @@ class MitsubaXml:
                 refuse(f"the encoding {shown_value(stated)} is not read; save the file as UTF-8")
 
         def start(tag: str, attributes: dict[str, str]) -> None:
+            if depth + len(parents) >= MAX_DEPTH:
+                refuse(f"elements are more than {MAX_DEPTH} deep, or files include each other in a circle")
             values = {key: self._completed(value) for key, value in attributes.items()}
             if fault := _fault_of(tag, values):
                 refuse(fault)
@@ -132,9 +136,7 @@ class MitsubaXml:
             asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
-                if len(searched) > MAX_INCLUDES:
-                    refuse(f"includes are more than {MAX_INCLUDES} deep, as in a circle")
-                names.extend(self._read(file, searched))
+                names.extend(self._read(file, searched, depth + len(parents)))
 
         parser.StartElementHandler, parser.EndElementHandler = start, lambda _: parents.pop()
         parser.StartDoctypeDeclHandler = lambda *_: refuse("a scene has no DOCTYPE and no entities")

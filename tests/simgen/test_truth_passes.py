@@ -84,6 +84,17 @@ def test_depth_is_planar_in_every_view() -> None:
     np.testing.assert_allclose(slanted.z_mm, 500.0 * normal[2] / (rays @ normal), rtol=1e-5)
 
 
+def test_each_object_keeps_its_own_id_and_the_backdrop_is_none() -> None:
+    # Compiled backends number shapes in no fixed order, so several shapes and a second scene matter.
+    places, cameras = [(-60.0, 0.0), (-20.0, 30.0), (20.0, -30.0), (60.0, 0.0)], grid(1, 1, 160, 200)
+    for z in (500.0, 640.0):
+        balls = [ball(f"s{n}", x, z, radius_mm=9.0, y_mm=y) for n, (x, y) in enumerate(places)]
+        object_id = first_hits_at_centre(evenly_lit(balls), cameras).object_id
+        middles = np.rint([project_px(cameras, (x, y, z), 0, 0) for x, y in places]).astype(int)
+        assert object_id[tuple(middles.T)].tolist() == [1, 2, 3, 4]
+        assert object_id[0, 0] == 0
+
+
 def test_normals_are_the_surfaces_own_and_face_the_camera() -> None:
     of = grid(2, 2, 96, 120)
     rays = directions(of)

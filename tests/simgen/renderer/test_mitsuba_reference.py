@@ -188,6 +188,7 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
         ),
         ("", OBJ % "linked.obj", "ascii", "lies outside the folder"),
         ("", '<include filename="scene.xml"/><include filename="scene.xml"/>', "ascii", "deep"),
+        ("", "<bsdf type='twosided'>" * 100 + "</bsdf>" * 100, "ascii", "100 deep"),
         ("", "<broken", "ascii", "not valid XML"),
         ('<!DOCTYPE scene [<!ENTITY a "b">]>', "", "ascii", "no DOCTYPE"),
         ('<?xml version="1.0" encoding="UTF-7"?>', "", "ascii", "encoding 'UTF-7'"),
