@@ -19,6 +19,8 @@ CORNERS = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 FACETS = np.array([[CORNERS[i] for i in (q[0], q[a], q[a + 1])] for q in QUADS for a in (1, 2)], np.float32)
 AT_600: dict[str, Any] = {"place_at_mm": (0, 0, 600)}
+MM: dict[str, Any] = {"unit": "mm"}
+NOWHERE: dict[str, Any] = {"unit": "mm", "place_at_mm": None}
 
 
 def write_obj(path: Path) -> None:
@@ -133,25 +135,6 @@ def test_solids_of_stl_files(tmp_path: Path) -> None:
     assert [thing.name for thing in load_scene(str(tmp_path / "two")).objects] == ["one", "two", "two-2"]
 
 
-def test_meshes_that_cannot_be_imported(tmp_path: Path) -> None:
-    write_stl(tmp_path / "a.stl")
-    whole = (tmp_path / "a.stl").read_bytes()
-    (tmp_path / "cut.stl").write_bytes(whole[:-30])
-    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
-    nowhere = {"unit": "mm", "place_at_mm": None}
-    cases = [
-        ("a.stl", {}, "--unit: .* has no unit of length"),
-        ("a.stl", nowhere, "has no camera; say where the middle of its 2 x 4 x 6 mm"),
-        ("cut.stl", {"unit": "mm"}, "has no faces|cut off"),
-        ("empty.obj", {"unit": "mm"}, "has no faces"),
-        ("none.ply", {"unit": "mm"}, "cannot be read"),
-    ]
-    for name, options, words in cases:
-        with pytest.raises(InputError, match=words):
-            import_scene(tmp_path / name, tmp_path / "out", **(AT_600 | options))
-    assert not (tmp_path / "out").exists()
-
-
 def plate(**mesh: Any) -> GltfDraft:
     draft = GltfDraft()
     draft.node(mesh=draft.mesh(uv=QUAD_UV, **mesh), name="plate")
@@ -220,12 +203,25 @@ def test_one_sentence_says_what_is_wrong(name: str, tmp_path: Path) -> None:
         ("a.glb", "mine", {}, "mine: is there already"),
         ("a.fbx", "out", {}, r"expected a glTF file \(.glb or .gltf\)"),
         ("b.glb", "out", {}, "there is no such file"),
+        ("a.stl", "out", {}, "--unit: .* has no unit of length"),
+        (
+            "a.stl",
+            "out",
+            MM | {"place_at_mm": None},
+            "has no camera; say where the middle of its 2 x 4 x 6 mm",
+        ),
+        ("cut.stl", "out", MM, "has no faces|cut off"),
+        ("empty.obj", "out", MM, "has no faces"),
+        ("none.ply", "out", MM, "cannot be read"),
     ],
 )
-def test_wrong_names_and_options_are_refused(
+def test_wrong_files_names_and_options_are_refused(
     tmp_path: Path, name: str, out: str, options: dict[str, Any], sentence: str
 ) -> None:
     (tmp_path / "a.glb").write_bytes(plate().glb())
+    write_stl(tmp_path / "a.stl")
+    (tmp_path / "cut.stl").write_bytes((tmp_path / "a.stl").read_bytes()[:-30])
+    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
     (tmp_path / "mine").mkdir()
     with pytest.raises(InputError, match=sentence):
         import_scene(tmp_path / name, tmp_path / out, **(AT_600 | options))
