@@ -78,6 +78,7 @@ def test_folders_of_other_things_are_refused(saved: Path, tmp_path: Path) -> Non
     assert "dataset itself" in one_sentence(lambda: save(dataset.path, dataset, 1), dataset.path)
     thesis = tmp_path / "thesis.tex"
     thesis.write_text("years of work")
+    assert "this is a file" in one_sentence(lambda: save(thesis, dataset, 1), thesis)
     thesis.rename(saved / "thesis.tex")
     assert "holds thesis.tex" in one_sentence(lambda: save(saved, dataset, 1, whole=True), saved)
     assert (saved / "thesis.tex").read_text() == "years of work"
