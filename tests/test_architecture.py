@@ -1,4 +1,4 @@
-"""The import rules of the design, kept by reading the source."""
+"""The import rules of the design, kept by reading the source, and packages where they are installed."""
 
 import ast
 import re
@@ -284,3 +284,14 @@ def test_pcii_offers_the_names_that_users_rely_on() -> None:
     for name in (nouns + " " + verbs).split():
         assert callable(getattr(pcii, name)), name
         assert name in pcii.__all__
+
+
+@pytest.mark.slow
+@pytest.mark.renders
+def test_the_packages_work_in_a_clean_environment(tmp_path: Path) -> None:
+    script = ROOT / "packaging" / "check_packages.py"
+    done = subprocess.run(
+        [sys.executable, str(script), str(tmp_path / "trial")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "analysis installs" in done.stdout

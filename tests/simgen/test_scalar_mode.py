@@ -12,8 +12,8 @@ HERE = Path(__file__).parent
 TESTS = [
     "test_lamps.py::test_a_points_light_falls_off_with_the_square_and_the_cosine",
     "test_lamps.py::test_a_spot_is_bright_in_its_beam_and_dark_beyond_its_cutoff",
-    "test_surroundings.py::test_what_is_not_visible_lights_things_before_darkness[uniform]",
-    "test_truth_passes.py::test_coverage_of_a_card_from_a_camera_off_the_centre",
+    "test_lamps.py::test_what_is_not_visible_lights_things_before_darkness[uniform]",
+    "truth/test_truth_file.py::test_coverage_of_a_card_from_a_camera_off_the_centre",
 ]
 """Tests of light, photons and truth that are run once more."""
 

@@ -193,9 +193,6 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
         assert re.search(f">{re.escape(words)}</t[hd]>", text)
     assert "pcii benchmark score MAPS --data BENCHMARK --half development -o submissions/theirs" in text
     assert "pcii benchmark run &#39;net:a; b&#39; --data" in text  # as one word of a shell
-    shutil.copytree(folder / "ours", folder / "again")
-    with pytest.raises(InputError, match="again and ours are both of 'depth:sweep-17'"):
-        write_page(folder, out)
     with pytest.raises(InputError, match="theirs: holds scores of 'depth:mine'; name another folder"):
         run_method("brightness", data, folder / "theirs")
     assert out.read_text() == text

@@ -266,7 +266,7 @@ def test_a_picture_of_interlaced_views(tmp_path: Path, capsys: Any) -> None:
     check_refused(command[0], tmp_path / "x", options, "24 x 128 px are no whole blocks", capsys)
 
 
-def test_frames_and_colours_have_axes_of_their_own() -> None:
+def test_frames_and_colours_have_axes_of_their_own_and_all_must_fit() -> None:
     frames = np.random.default_rng(3).random((H, W, 3, 2, 2, FRAMES)) < 0.2
     counts = import_counts(frames, OPTICS, axes="HWCKLT", cfa="GRBG")
     expected = mosaic(frames.sum(axis=5).transpose(3, 4, 0, 1, 2), "GRBG")
@@ -274,20 +274,14 @@ def test_frames_and_colours_have_axes_of_their_own() -> None:
     radiance = np.random.default_rng(3).random((3, H, W, 2, 2))
     views = pcii.import_arrays(radiance, OPTICS, axes="CHWKL")
     np.testing.assert_allclose(np.asarray(views.radiance), radiance.transpose(3, 4, 1, 2, 0), rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("shape", "axes", "words"),
-    [
+    for shape, wrong, words in (
         ((40, 48, 5, 5), None, "would be more views than each has numbers; name the order .* such as HWKL"),
         ((40, 48, 5, 3, 3), None, "would be more views than each has numbers"),
         ((), None, r"expected \(K, L, "),
         ((40, 48, 3, 3), "HWK", "--axes: expected each axis once, K and L"),
         ((40, 48, 3, 3), "HWKK", "--axes: expected each axis once"),
         ((40, 48, 3), "HWKL", r"has the shape \(40, 48, 3\), and --axes HWKL are 4 axes"),
-    ],
-)
-def test_axes_that_do_not_fit_are_refused(shape: tuple[int, ...], axes: str | None, words: str) -> None:
-    for read in (import_counts, pcii.import_arrays):
-        with pytest.raises(InputError, match=words):
-            read(np.ones(shape), OPTICS, axes=axes)
+    ):
+        for read in (import_counts, pcii.import_arrays):
+            with pytest.raises(InputError, match=words):
+                read(np.ones(shape), OPTICS, axes=wrong)

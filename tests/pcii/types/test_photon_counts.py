@@ -202,18 +202,12 @@ def test_rates_of_a_range_of_frames_are_those_of_its_bits(span: tuple[int, int])
     [
         ({"frames": 2.0}, "frames: expected a whole number"),
         ({"n": [3]}, "n: a pixel has 3 counts, where frames = 2, bits = 1 hold 2"),
-        ({"frame": [0, 2]}, "frame: 2 is outside 0 .. 1"),
-        ({"frame": [1, 1]}, "frame: a pixel has more counts in frame 1 than 1"),
+        ({"frame": np.array([0, 2])}, "frame: 2 is outside 0 .. 1"),
+        ({"frame": np.array([1, 1])}, "frame: a pixel has more counts in frame 1 than 1"),
     ],
 )
 def test_what_frames_cannot_hold_is_refused(changed: dict, named: str) -> None:
     options = {"n": [2], "frames": 2, "bits": 1} | changed
-    n, frame = np.array(options.pop("n")), options.pop("frame", None)
+    n, place = np.array(options.pop("n")), np.array([[0], [0], [1], [1]])
     with pytest.raises(InputError, match=named):
-        PhotonCounts.from_events(
-            *np.array([[0], [0], [1], [1]]),
-            n,
-            FILM,
-            **options,
-            frame=None if frame is None else np.array(frame),
-        )
+        PhotonCounts.from_events(*place, n, FILM, **options)

@@ -67,6 +67,8 @@ def sections() -> Sections:
         (lambda: Truth(ONES, IDS + 2, {1: "ball"}), "object_id: id 2 has no name"),
         (lambda: Truth(ONES, IDS, {}, coverage=ONES), r"coverage: expected float32 \(2, 2\)"),
         (lambda: PhotonCounts.from_dense(IDS, {"rows": 1}), "grid: expected a CameraGrid, got dict"),  # type: ignore[arg-type]
+        (lambda: mosaic(np.zeros((4, 4, 4)), "GRBG"), "rgb: "),
+        (lambda: colour_index(2, 2, "grbg"), f"cfa: .*'grbg'.* {', '.join(PATTERNS)}, or none"),
         (lambda: reconstruct(IDS, [1.0]), r"data: expected PhotonCounts or Views .*, got ndarray"),  # type: ignore[arg-type]
     ],
 )
@@ -114,13 +116,6 @@ def test_a_mosaic_keeps_the_colour_that_each_pixel_sees(cfa, height, width, seed
     for i, j in np.ndindex(height, width):
         assert colours[i, j] == colour_of(i, j, cfa)
         np.testing.assert_array_equal(raw[:, i, j], rgb[:, i, j, colour_of(i, j, cfa)])
-
-
-def test_what_is_no_mosaic_is_refused():
-    with pytest.raises(InputError, match=r"^rgb: "):
-        mosaic(np.zeros((4, 4, 4)), "GRBG")
-    with pytest.raises(InputError, match=f"^cfa: .*'grbg'.* {', '.join(PATTERNS)}, or none"):
-        colour_index(2, 2, "grbg")
 
 
 depths = st.floats(200, 5000)

@@ -1,4 +1,4 @@
-"""Datasets: the same bytes again, resuming, and refusing what is not ours."""
+"""Datasets: the same bytes again, resuming, refusing what is not ours, and reuse between datasets."""
 
 import fcntl
 import json
@@ -12,14 +12,15 @@ import zarr
 from digests import digest
 from lit_scenes import EVENLY, card
 from stored_datasets import flip_a_bit, one_sentence
-from tiny import TINY_RECIPE
+from tiny import GRID_2_X_2, TINY_RECIPE
 from zarr.storage import ZipStore
 
-from pcii.base import InputError
+from pcii.base import InputError, silent
 from pcii.store import ARRAYS, MANIFEST, MARKER, RADIANCE, TRUTH, open_dataset, provenance, verify
 from simgen.cameras import rig_of
-from simgen.dataset import Prepared, generate, rendered_views
-from simgen.spec import Recipe
+from simgen.dataset import Prepared, generate, generation, prepare, rendered_views
+from simgen.dataset.generation import Reuse, make
+from simgen.spec import Recipe, load_recipe
 
 pytestmark = pytest.mark.renders
 TINY = TINY_RECIPE | {
@@ -131,6 +132,8 @@ def test_a_finished_dataset_is_left_alone_and_one_that_another_run_writes(
     monkeypatch.setattr(Prepared, "render_scene", lambda _: pytest.fail("rendered again"))
     before = (made / MANIFEST).stat().st_mtime_ns
     generate(recipe(), Path(), made)
+    with pytest.raises(InputError, match="of another recipe or scene"):
+        generate(recipe(seed=99), Path(), made)
     assert (made / MANIFEST).stat().st_mtime_ns == before
     with (tmp_path / MARKER).open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -149,15 +152,6 @@ def test_a_scene_that_cannot_be_loaded_leaves_no_folder_behind(tmp_path: Path) -
             generate(recipe(scene=str(tmp_path / "scene")), Path(), out)
     assert not (tmp_path / "new").exists()
     assert list((tmp_path / "empty").iterdir()) == []
-
-
-def test_a_folder_with_something_else_is_refused_and_untouched(made: Path, tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(InputError, match="holds something else"):
-        generate(recipe(), Path(), tmp_path)
-    assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
-    with pytest.raises(InputError, match="of another recipe or scene"):
-        generate(recipe(seed=99), Path(), made)
 
 
 def test_what_other_software_made_is_refused_and_untouched(
@@ -206,3 +200,70 @@ def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_pa
     same = {name for name in perfect if off[name] == perfect[name]}
     assert any(name.startswith(f"{TRUTH}/z_mm/c/") for name in same)  # the virtual centre has no errors
     assert not any(name.startswith((f"{TRUTH}/view_z_mm/c/", RADIANCE)) for name in same)
+
+
+TOML = f'scene = "plain_pair"\nseed = 3\n{GRID_2_X_2}[photons]\nbudget = 100\n'
+ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
+OTHERS = [
+    ["photons.budget=300"],
+    [ERRORS, "seed=4"],
+    ["analysis.z_mm=[500.0]"],
+    ["grid.pitch_mm=[9.0,18.0]"],
+    ["scene=two_objects"],
+]
+
+
+@pytest.fixture
+def recipe_file(tmp_path: Path) -> str:
+    path = tmp_path / "tiny.toml"
+    path.write_text(TOML)
+    return str(path)
+
+
+@pytest.mark.parametrize("others", [[["scene=two_objects"]], pytest.param(OTHERS, marks=pytest.mark.slow)])
+def test_datasets_are_the_same_whatever_was_made_before(
+    others: list[list[str]], recipe_file: str, tmp_path: Path
+) -> None:
+    reuse, alone = Reuse(), tmp_path / "alone"
+    for number, overrides in enumerate([[], *others, []]):
+        recipe, near = load_recipe(recipe_file, overrides)
+        make(prepare(recipe, near), tmp_path / f"reused {number}", silent, reuse)
+        if not (alone / str(overrides)).exists():
+            generate(recipe, near, alone / str(overrides))
+        assert digest(tmp_path / f"reused {number}") == digest(alone / str(overrides)), overrides
+
+
+def test_only_what_depends_on_a_change_is_made_again(
+    recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    works: list[str] = []
+
+    def watch(owner: Any, name: str) -> None:
+        work = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda *args: works.append(name) or work(*args))
+
+    watch(Prepared, "render_scene")
+    watch(Prepared, "plan")
+    watch(generation, "write_truth")
+    reuse = Reuse()
+    make(prepare(*load_recipe(recipe_file)), tmp_path / "first", silent, reuse)
+    assert sorted(works) == ["plan", "render_scene", "write_truth"]
+    works.clear()
+    make(prepare(*load_recipe(recipe_file, [ERRORS])), tmp_path / "second", silent, reuse)
+    assert sorted(works) == ["plan", "write_truth"]
+
+
+def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -> None:
+    scene = tmp_path / "mine"
+    scene.mkdir()
+    thing = card(500, 0, {"reflectance": [0.5, 0.5, 0.5]}) | {"shape": {"type": "mesh", "file": "card.obj"}}
+    values = {"title": "one card", "objects": [thing], "lights": [EVENLY]}
+    (scene / "scene.toml").write_text(tomli_w.dumps(values))
+    reuse, digests = Reuse(), set[str]()
+    for size in (30, 60):
+        corners = "\n".join(f"v {x * size} {y * size} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        (scene / "card.obj").write_text(f"{corners}\nf 1 2 3\nf 1 3 4\n")
+        recipe, near = load_recipe(recipe_file, [f"scene={scene}"])
+        make(prepare(recipe, near), tmp_path / f"of {size}", silent, reuse)
+        digests.add(str(digest(tmp_path / f"of {size}")))
+    assert len(digests) == 2

@@ -10,6 +10,7 @@ from random import Random
 
 import numpy as np
 import pytest
+from other_packages import install_package
 
 import simgen
 from pcii.base import InputError
@@ -97,21 +98,12 @@ def test_solids_on_the_desk_stand_and_do_not_touch() -> None:
             assert thing.position_mm[1] + height / 2 == pytest.approx(65, abs=0.2)
 
 
-def install(folder: Path, monkeypatch: pytest.MonkeyPatch, points: dict[str, str]) -> None:
-    """Put a package `strange` with these entry points on the path."""
-    about = folder / "strange-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: strange\nVersion: 1.0\n")
-    lines = [f"{name} = {value}\n" for name, value in points.items()]
-    (about / "entry_points.txt").write_text("[simgen.scenes]\n" + "".join(lines))
-    (folder / "strange_scenes.py").write_text(CODE)
-    (folder / "label.png").write_bytes(b"not looked at")
-    monkeypatch.syspath_prepend(str(folder))
+FILES = {"strange_scenes.py": CODE, "label.png": "not looked at"}
 
 
 def test_scenes_of_another_package_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     points = {name: f"strange_scenes:{name}" for name in ("good", "failing", "text")}
-    install(tmp_path, monkeypatch, points)
+    install_package(tmp_path, monkeypatch, {"simgen.scenes": points}, FILES)
     assert drawn_scenes()["good"] == "the package strange"
     scene = load_scene("good", number=4)
     drawn = random.Random("good 4").randrange(100)
@@ -127,7 +119,8 @@ def test_scenes_of_another_package_are_found_by_name(tmp_path: Path, monkeypatch
 def test_a_name_that_two_packages_register_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(tmp_path, monkeypatch, {"drawn_room": "strange_scenes:good"})
+    points = {"simgen.scenes": {"drawn_room": "strange_scenes:good"}}
+    install_package(tmp_path, monkeypatch, points, FILES)
     with pytest.raises(InputError, match="needs another name than 'drawn_room'"):
         drawn_scenes()
 

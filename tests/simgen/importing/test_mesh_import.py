@@ -1,11 +1,13 @@
-"""Meshes alone become scenes: an object for each group or solid, upright, of the size that is stated."""
+"""Meshes alone become scenes, upright and of the stated size; files with faults are one sentence each."""
 
+import json
 import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from gltf_draft import QUAD_UV, GltfDraft, glb
 from scipy.spatial.transform import Rotation
 
 from pcii.base import InputError
@@ -17,6 +19,8 @@ CORNERS = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 FACETS = np.array([[CORNERS[i] for i in (q[0], q[a], q[a + 1])] for q in QUADS for a in (1, 2)], np.float32)
 AT_600: dict[str, Any] = {"place_at_mm": (0, 0, 600)}
+MM: dict[str, Any] = {"unit": "mm"}
+NOWHERE: dict[str, Any] = {"unit": "mm", "place_at_mm": None}
 
 
 def write_obj(path: Path) -> None:
@@ -131,20 +135,94 @@ def test_solids_of_stl_files(tmp_path: Path) -> None:
     assert [thing.name for thing in load_scene(str(tmp_path / "two")).objects] == ["one", "two", "two-2"]
 
 
-def test_meshes_that_cannot_be_imported(tmp_path: Path) -> None:
-    write_stl(tmp_path / "a.stl")
-    whole = (tmp_path / "a.stl").read_bytes()
-    (tmp_path / "cut.stl").write_bytes(whole[:-30])
-    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
-    nowhere = {"unit": "mm", "place_at_mm": None}
-    cases = [
-        ("a.stl", {}, "--unit: .* has no unit of length"),
-        ("a.stl", nowhere, "has no camera; say where the middle of its 2 x 4 x 6 mm"),
-        ("cut.stl", {"unit": "mm"}, "has no faces|cut off"),
-        ("empty.obj", {"unit": "mm"}, "has no faces"),
-        ("none.ply", {"unit": "mm"}, "cannot be read"),
-    ]
-    for name, options, words in cases:
-        with pytest.raises(InputError, match=words):
-            import_scene(tmp_path / name, tmp_path / "out", **(AT_600 | options))
+def plate(**mesh: Any) -> GltfDraft:
+    draft = GltfDraft()
+    draft.node(mesh=draft.mesh(uv=QUAD_UV, **mesh), name="plate")
+    return draft
+
+
+def changed(path: str, value: Any) -> bytes:
+    """A sound binary file with another value at a dotted path of its JSON."""
+    draft = plate()
+    document = json.loads(json.dumps(draft.document()))
+    *steps, last = [int(step) if step.isdigit() else step for step in path.split(".")]
+    target: Any = document
+    for step in steps:
+        target = target[step]
+    target[last] = value
+    return glb(json.dumps(document).encode(), draft.bytes)
+
+
+def with_uri(uri: str) -> bytes:
+    return changed("buffers", [{"uri": uri, "byteLength": 4}])
+
+
+NAN = np.array([(0, 0, 0), (1, 0, 0), (0, np.nan, 0), (0, 1, 0)], "<f4")
+FILES: dict[str, tuple[bytes, str]] = {
+    "no JSON": (b"\x00\x01\x02 this is no scene", "not a glTF file"),
+    "version 1": (b'{"asset": {"version": "1.0"}}', r"'asset.version'.* got '1.0'"),
+    "cut off": (plate().glb()[:300], "cut off"),
+    "http": (with_uri("http://example.org/a.bin"), "there is no file"),
+    "outside, encoded": (with_uri("%2e%2e/%2e%2e/etc/passwd"), "lies outside"),
+    "short buffer": (with_uri("data:;base64,AAAA"), r"accessors\[0\]: its 4 elements do not fit"),
+    "10^8 zeros": (
+        changed("accessors.0", {"componentType": 5126, "count": 10**8, "type": "VEC3"}),
+        "at most 4194304 elements of VEC3 .* got 100000000",
+    ),
+    "no such accessor": (changed("meshes.0.primitives.0.indices", 99), r"no accessors\[99\]"),
+    "index beyond": (changed("accessors.0.count", 3), "vertex 3, but only"),
+    "NaN vertices": (plate(positions=NAN).glb(), r"accessors\[0\]: has numbers that are nan"),
+    "a circle of nodes": (changed("nodes.0.children", [0]), "stands in a circle"),
+    "Draco": (
+        changed("extensionsRequired", ["KHR_draco_mesh_compression"]),
+        "KHR_draco_mesh_compression; export it without compression",
+    ),
+    "nothing": (b'{"asset": {"version": "2.0"}}', "no surface"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_one_sentence_says_what_is_wrong(name: str, tmp_path: Path) -> None:
+    content, sentence = FILES[name]
+    path = tmp_path / "scene.glb"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=sentence) as refused:
+        import_scene(path, tmp_path / "out", **AT_600)
+    text = str(refused.value)
+    assert text.startswith(str(path))
+    assert "\n" not in text
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "out", "options", "sentence"),
+    [
+        ("a.glb", "out", {"unit": "mile"}, "unit: expected one of mm, cm, m, in, ft, got 'mile'"),
+        ("a.glb", "out", {"emission_unit": "lumen"}, "expected nit, or watt for a glTF file, got 'lumen'"),
+        ("a.glb", "out", {"camera": "left"}, "give camera or place_at_mm, not both"),
+        ("a.glb", "mine", {}, "mine: is there already"),
+        ("a.fbx", "out", {}, r"expected a glTF file \(.glb or .gltf\)"),
+        ("b.glb", "out", {}, "there is no such file"),
+        ("a.stl", "out", {}, "--unit: .* has no unit of length"),
+        (
+            "a.stl",
+            "out",
+            MM | {"place_at_mm": None},
+            "has no camera; say where the middle of its 2 x 4 x 6 mm",
+        ),
+        ("cut.stl", "out", MM, "has no faces|cut off"),
+        ("empty.obj", "out", MM, "has no faces"),
+        ("none.ply", "out", MM, "cannot be read"),
+    ],
+)
+def test_wrong_files_names_and_options_are_refused(
+    tmp_path: Path, name: str, out: str, options: dict[str, Any], sentence: str
+) -> None:
+    (tmp_path / "a.glb").write_bytes(plate().glb())
+    write_stl(tmp_path / "a.stl")
+    (tmp_path / "cut.stl").write_bytes((tmp_path / "a.stl").read_bytes()[:-30])
+    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(InputError, match=sentence):
+        import_scene(tmp_path / name, tmp_path / out, **(AT_600 | options))
+    assert not [*(tmp_path / "mine").iterdir(), *tmp_path.glob("out")]

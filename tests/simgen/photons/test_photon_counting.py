@@ -1,4 +1,4 @@
-"""Counts of a dataset: which way they are made, budgets within budgets, and what is written of them."""
+"""Counts of a dataset: which way they are made, with how much noise, budgets within budgets, and files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
-from lit_scenes import EVENLY, LAMP, build_scene
+from lit_scenes import EVENLY, LAMP, build_scene, two_balls
 from photon_statistics import counted, is_poisson, p_value
 
 from pcii.base import InputError, silent
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name
-from pcii.types import PhotonCounts, colour_index
+from pcii.types import CameraGrid, PhotonCounts, colour_index, sense
 from simgen.dataset import capture_of, draw_from_views, write_counts
-from simgen.photons import Capture, Plan, plan_counts, thin_photons
-from simgen.renderer import RenderScene, backend, build
+from simgen.photons import Capture, Plan, plan_counts, probe, thin_photons
+from simgen.renderer import RenderScene, backend, build, render_view
 from simgen.sensor import PhotonTable, nested_subset
 from simgen.spec import Recipe, load_scene
 
@@ -328,3 +328,78 @@ def test_darkness_is_planned_too() -> None:
     # What the virtual centre sees says nothing about how large a budget is.
     with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
         planned(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
+
+
+GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=1.0, height=64, width=64)
+DRAWS = 30
+PROBE_SAMPLES = 64
+
+
+@pytest.fixture(scope="module")
+def scene() -> RenderScene:
+    return two_balls()
+
+
+def seen(built: RenderScene, samples: int, seed: int) -> np.ndarray:
+    image = render_view(built, GRID, 0, 0, samples_per_pixel=samples, seed=seed)
+    return sense(image, "GRBG").astype(np.float64)
+
+
+@pytest.fixture(scope="module")
+def radiance(scene: RenderScene) -> np.ndarray:
+    """Mosaic (H, W) of 1024 samples: its own noise is one thousandth of what is measured against it."""
+    return seen(scene, 1024, seed=99)
+
+
+@pytest.mark.renders
+def test_the_probe_sees_the_mean_and_repeats_itself(scene: RenderScene, radiance: np.ndarray) -> None:
+    looked = probe(Capture(scene, GRID, "GRBG"), seed=1)
+    spread = np.sqrt(looked.variance / (2 * PROBE_SAMPLES * radiance.size))
+    assert abs(looked.mean - radiance.mean()) < 4 * spread
+    assert probe(Capture(scene, GRID, "GRBG"), seed=1) == looked
+    assert probe(Capture(scene, GRID, "GRBG"), seed=2) != looked
+
+
+def looked_often(built: RenderScene, grid: CameraGrid) -> Any:
+    """The mean of four probes: few paths find much light, and one probe's variance is good to 16 %."""
+    found = [probe(Capture(built, grid, "GRBG"), seed) for seed in range(4)]
+    mean, variance = (float(np.mean(values)) for values in zip(*(one[:2] for one in found), strict=True))
+    return found[0]._replace(mean=mean, variance=variance)
+
+
+def excess(scene: RenderScene, radiance: np.ndarray, gain: float, samples: int) -> float:
+    """By how much counts drawn from noisy views are more dispersed than Poisson ones, as a share of that."""
+    rng = np.random.default_rng(1)
+    rates = gain * radiance
+    squares = [
+        (rng.poisson(gain * seen(scene, samples, seed)) - rates) ** 2 / rates.sum() for seed in range(DRAWS)
+    ]
+    return float(np.sum(squares) / DRAWS - 1)
+
+
+@pytest.mark.renders
+def test_counts_are_as_noisy_as_the_probe_tells(scene: RenderScene, radiance: np.ndarray) -> None:
+    looked = looked_often(scene, GRID)
+    close = 1.4  # 4 standard errors: 8 % of four probes and 6 % of the counts
+    for share in (1.0, 4.0):
+        gain = share * looked.mean / looked.variance
+        ratio = looked.photon_noise(gain, samples=1) / excess(scene, radiance, gain, samples=1)
+        assert 1 / close < ratio < close
+        # The faults: a difference's variance for that of one of the two, a mean's for a sample's.
+        for wrong in (2, 1 / PROBE_SAMPLES, 2 / PROBE_SAMPLES):
+            assert not 1 / close < ratio * wrong < close
+
+
+@pytest.mark.renders
+def test_planned_samples_keep_rendering_noise_out_of_the_counts(
+    scene: RenderScene, radiance: np.ndarray
+) -> None:
+    looked = probe(Capture(scene, GRID, "GRBG"), seed=1)
+    gain = 0.295 * looked.mean / looked.variance
+    samples = looked.samples_for(gain)
+    assert samples == 30
+    # The mean of n squared standard Poisson deviates, weighted by their rates, spreads by this.
+    rates = gain * radiance
+    spread = np.sqrt((2 * rates**2 + rates).sum() / DRAWS) / rates.sum()
+    assert excess(scene, radiance, gain, samples) < MAX_NOISE_SHARE + 4 * spread
+    assert excess(scene, radiance, gain, samples=1) > MAX_NOISE_SHARE + 4 * spread
