@@ -216,7 +216,9 @@ def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
 
 
 def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsys) -> None:
-    save_dataset(tmp_path / "d", COUNTS)
+    grid = replace(GRID, cols=2)
+    dim = np.random.default_rng(1).poisson(0.2, grid.shape_KLHW)
+    save_dataset(tmp_path / "d", PhotonCounts.from_dense(dim, grid, cfa="GRBG"))
     out = tmp_path / "out"
     assert run("segment", tmp_path / "d", "-o", out) == 2
     assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
@@ -229,9 +231,9 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert run(*found) == 2
     assert "no depth is found in the range; name depths with --z-mm" in capsys.readouterr().err
     texture = np.random.default_rng(2).gamma(0.5, 40, (40, 48))  # 2 px from view to view are 500 mm
-    wall = [[np.roll(texture, (-2 * k, -2 * l), (0, 1)) for l in range(3)] for k in range(2)]
+    wall = [[np.roll(texture, (-2 * k, -2 * l), (0, 1)) for l in range(2)] for k in range(2)]
     photons = np.random.default_rng(3).poisson(wall)
-    save_dataset(tmp_path / "wall", PhotonCounts.from_dense(photons, GRID))
+    save_dataset(tmp_path / "wall", PhotonCounts.from_dense(photons, grid))
     assert run("run", tmp_path / "wall", "-o", tmp_path / "seen", *found[4:-2]) == 0
     (depths,) = re.findall(r"the depth map has most surfaces at ([\d., ]+) mm;", capsys.readouterr().out)
     assert min(abs(float(text) - 500) for text in depths.split(",")) < 30

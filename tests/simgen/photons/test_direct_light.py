@@ -194,8 +194,8 @@ def test_noise_of_views_is_measured_and_too_much_is_refused() -> None:
     capture, plan, pixels = capture_of(made, no_scene, 1), Plan(False, 4, 500.0), 64**2
 
     def draw(variance: float) -> dict[str, Any]:
-        views = lambda k, l: np.ones((64, 64)), lambda k, l: np.full(3, variance)
-        return draw_from_views(capture, *views, plan, silent)[1]
+        view = np.ones((64, 64)), np.full(3, variance)
+        return draw_from_views(capture, lambda k, l: view, plan, silent)[1]
 
     # Added variance g^2 v beside g pixels, g = 500 / pixels.
     assert draw(0.02)["rendering_noise"] == pytest.approx(500 / pixels * 3 * 0.02 / pixels, rel=0.01)
