@@ -45,7 +45,9 @@ def compiled(function: Callable[..., Result]) -> Callable[..., Result]:
 def _compiled(function: Any) -> Any:
     names, options = function.__globals__, {"nogil": True, "cache": True}
     for name, value in list(names.items()):
-        if isinstance(value, FunctionType) and value in _helpers:  # has no entry from Python to compile
+        # Numba finds helpers among the names of the loop's module, and wants them compiled there. They have
+        # no entry from Python, which would take time to compile.
+        if isinstance(value, FunctionType) and value in _helpers:
             names[name] = _numba().njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)(value)
     return _numba().njit(**options)(function)
 
