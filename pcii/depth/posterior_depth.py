@@ -96,7 +96,7 @@ class PosteriorDepth:
     least_photons: float = 10.0
     """Their least number, in a Gaussian of weight 1 at its centre."""
     margin_blocks: int = 64
-    """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
+    """The network is run this far beyond the blocks with `least_photons`: two cells of its coarsest level."""
 
     max_empty: float = 0.5
     """Largest probability of no surface where one is answered."""

@@ -233,7 +233,7 @@ def gaussian_mean(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 @cache
 def gaussian_weights(sigma: float, deviations: int) -> np.ndarray:
-    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian, up to so many standard deviations."""
+    """Weights (R + 1,) float32 of the blocks 0 to R away in a Gaussian that ends at `deviations` sigma."""
     distance = np.arange(int(deviations * sigma + 0.5) + 1)
     weight = np.exp(-((distance / sigma) ** 2) / 2)
     return (weight / (2 * weight.sum() - weight[0])).astype(np.float32)

@@ -180,7 +180,7 @@ def adaptive_threshold(
     slope2 = roberts_magnitude(samples.mean) ** 2 / (2 * cell_px**2)
     limit = noise + slope2 * (tolerance**2 / 3 + 1 / 12)
     known = samples.number >= FEWEST_SAMPLES
-    # With so many windows, single ones exceed T by chance, and with them the cells that share their samples.
+    # Of many windows a few exceed T by chance, and with them the cells that share their samples.
     rejected = _large_pieces(known & (samples.variance > limit), WINDOW_CELLS**2)
     maps = {
         "mean": samples.mean.astype(np.float32),

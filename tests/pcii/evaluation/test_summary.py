@@ -148,7 +148,7 @@ def test_means_are_over_the_seeds_that_have_a_value() -> None:
 
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
-SHOWN = NAMES[:6]  # of so many scenes all tables are shown
+SHOWN = NAMES[:6]  # up to this number of scenes all tables are shown
 ELEMENTS = "html head meta title style body main h1 h2 h3 p code span div table thead tbody tr th td strong "
 ELEMENTS += "figure img figcaption details summary"
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
