@@ -252,6 +252,19 @@ def test_files_are_short() -> None:
                 assert len(file.read_text().splitlines()) <= LONGEST_FILE, name
 
 
+def test_tests_and_scripts_that_sentences_name_are_there() -> None:
+    for file in [
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("pcii/**/*.py"),
+        *ROOT.glob("simgen/**/*.py"),
+    ]:
+        for name in re.findall(
+            r"\b(?:tests|benchmarks|packaging|training|examples)/[\w/]+\.py\b", file.read_text()
+        ):
+            assert (ROOT / name).is_file(), f"{file.name}: {name}"
+
+
 def test_no_module_shares_its_name_with_a_function() -> None:
     """But for commands: they have the names that users type."""
     for package in ROOMS:

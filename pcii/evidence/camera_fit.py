@@ -45,7 +45,7 @@ of the cells that have to be reached in a window: more than half. A larger windo
 and more of what is small. Views of less than three windows are not judged."""
 
 # What decides, set by hand so that right views are not warned about and wrong ones are, as
-# tests/pcii/evidence/test_camera_fit.py keeps it. If a share of the variance is larger, noise decides.
+# tests/pcii/evidence/test_texture_evidence.py keeps it. If a share of the variance is larger, noise decides.
 BETTER = 0.75
 """An order is better than others if at most this share of their variance remains."""
 SHARP = 0.5
