@@ -241,10 +241,8 @@ def wall_views(grid: CameraGrid, disparity_px: tuple[float, float]) -> np.ndarra
     for k, l in np.ndindex(grid.rows, grid.cols):
         down = i + (k - (grid.rows - 1) / 2) * disparity_px[1]
         right = j + (l - (grid.cols - 1) / 2) * disparity_px[0]
-        waves = np.cos(
-            frequency * (np.cos(angle) * right[..., None] + np.sin(angle) * down[..., None]) + phase
-        )
-        views[k, l, ..., 0] = 1 + waves.mean(axis=-1) * 2
+        along = np.cos(angle) * right[..., None] + np.sin(angle) * down[..., None]
+        views[k, l, ..., 0] = 1 + 2 * np.cos(frequency * along + phase).mean(axis=-1)
     return np.maximum(views, 0.05)
 
 
@@ -266,6 +264,9 @@ def test_a_wall_is_found_where_it_is(method: str, kind: str, most_px: float) -> 
     # Neighbouring planes can be the same section, since shifts are whole pixels.
     assert (error_px < 2).mean() > 0.97
     assert ((depth.confidence > 0) == np.isfinite(depth.z_mm)).all()
+    # The fault: cameras in the wrong order. Their depth is another one, or there is none.
+    wrong = estimate_depth(data_of(kind, grid, seen[::-1, ::-1]), WALL_RANGE_MM, method=method)
+    assert not np.median(np.abs(6 / wrong.z_mm[inner] - 6 * TRUE_PX)) < most_px
 
 
 def test_depth_has_no_levels_that_whole_shifts_would_give() -> None:
@@ -276,15 +277,6 @@ def test_depth_has_no_levels_that_whole_shifts_would_give() -> None:
         error_px.append(np.nanmedian(5 / depth.z_mm[16:-16, 16:-16]) - 5 * disparity_px)
     # 0.6 px with shifts to the nearest pixel.
     assert np.sqrt(np.mean(np.square(error_px))) < 0.4
-
-
-@pytest.mark.parametrize(("method", "kind", "most_px"), METHODS)
-def test_cameras_in_the_wrong_order_do_not_pass(method: str, kind: str, most_px: float) -> None:
-    grid = unit_grid(5, 7, 64, 72)
-    seen = wall_views(grid, (TRUE_PX, TRUE_PX))[::-1, ::-1]
-    depth = estimate_depth(data_of(kind, grid, seen), WALL_RANGE_MM, method=method)
-    error_px = np.abs(6 / depth.z_mm[16:-16, 16:-16] - 6 * TRUE_PX)
-    assert not np.median(error_px) < most_px  # or it is not answered
 
 
 @pytest.mark.parametrize("method", ["sweep-17", "variance-sweep"])
@@ -327,12 +319,9 @@ def half_a_map(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
 
 
 def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = [
-        EntryPoint(name, f"{__name__}:{name}", "pcii.depth_methods") for name in ("halfway", "half_a_map")
-    ]
-    monkeypatch.setattr(
-        "importlib.metadata.entry_points", lambda group: [point for point in points if point.group == group]
-    )
+    group, names = "pcii.depth_methods", ("halfway", "half_a_map")
+    points = {group: [EntryPoint(name, f"{__name__}:{name}", group) for name in names]}
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points.get(group, []))
     assert "halfway" in depth_methods(EVEN)
     assert (estimate_depth(EVEN, (0.5, 1.0), method="halfway").z_mm == 0.75).all()
     words = r"'half_a_map' of a package must return a pcii\.DepthMap of 8 x 8"

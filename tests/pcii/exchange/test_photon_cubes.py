@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,8 +62,7 @@ def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
 def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
     """Sums and the frame of every single count are those of the bits (K, L, T, H, W)."""
     np.testing.assert_array_equal(counts.dense, bits.sum(axis=2))
-    events = counts.frame_events
-    assert events is not None
+    events: Any = counts.frame_events
     listed = np.stack([events.k, events.l, events.i, events.j, events.frame], axis=1)
     np.testing.assert_array_equal(listed, np.argwhere(bits.transpose(0, 1, 3, 4, 2)))
 
@@ -116,9 +116,8 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
 def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
     rng, notes = np.random.default_rng(1), []
     import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=notes.append)
-    assert notes == [
-        "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
-    ]
+    words = "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
+    assert notes == [words]
     counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
     import_counts(counts, OPTICS, note=notes.append)
     assert len(notes) == 1
@@ -171,9 +170,7 @@ def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make, options, wor
 
 
 BLOCK_BYTES = 4096
-SHEARED = pcii.CameraGrid(
-    rows=2, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=6, width=16, shear_px=(1.5, -2)
-)
+SHEARED = replace(GRID, cols=2, height=6, width=16, shear_px=(1.5, -2))
 
 
 @pytest.mark.parametrize("grid", [GRID, SHEARED])

@@ -37,18 +37,9 @@ def thing(name: str, *z_mm: float, share: float = 0.1, light: np.ndarray = EVEN,
 def facts(*objects: ObjectFacts, recipe: dict[str, Any] | None = None, **more: Any) -> Facts:
     glass = ball("a", 0, 540, finish={"type": "glass"})
     scene = {"objects": [glass]} if more.pop("glass", False) else {"backdrop": more.pop("backdrop", None)}
-    known = {
-        "corners": 4,
-        "luminance": 1.0,
-        "colour_share": np.array([0.25, 0.5, 0.25]),
-        "other_shares": {},
-        "lamps_away": (),
-        "plan": Plan(thins=True, samples=8, photons_per_view=1000.0),
-        "path_s": 1e-7,
-        "hit_s": 1e-7,
-        "is_compiled": True,
-        "memory_bytes": 1e12,
-    }
+    known = {"corners": 4, "luminance": 1.0, "colour_share": np.array([0.25, 0.5, 0.25])}
+    known |= {"other_shares": {}, "lamps_away": (), "path_s": 1e-7, "hit_s": 1e-7}
+    known |= {"plan": Plan(True, 8, 1000.0), "is_compiled": True, "memory_bytes": 1e12}
     return Facts(target=target_of(recipe or {}, **scene), objects=objects, **(known | more))
 
 

@@ -20,18 +20,17 @@ from simgen.photons import Plan
 from simgen.spec import Analysis, Recipe
 
 Table = dict[str, Any]
-
 CARD = {"type": "card", "width_mm": 20.0, "height_mm": 30.0}
+MESH = {"type": "mesh", "file": "a.ply"}
 SCENE: Table = {
     "title": "one of each kind of file",
     "objects": [
         {"name": "picture", "position_mm": [0, 0, 500], "shape": CARD, "material": {"texture": "a.png"}},
-        {"name": "mesh", "position_mm": [0, 0, 600], "shape": {"type": "mesh", "file": "a.ply"}},
+        {"name": "mesh", "position_mm": [0, 0, 600], "shape": MESH, "material": {"reflectance": "dark skin"}},
     ],
     "lights": [{"type": "environment", "file": "a.exr", "luminance_cd_m2": 100.0}],
     "planes_mm": [540.0, 620.0],
 }
-SCENE["objects"][1]["material"] = {"reflectance": "dark skin"}
 PLAIN = {"title": "even light", "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}]}
 RECIPE: Table = {
     "scene": "here",
@@ -178,7 +177,7 @@ def recipe(**values: Any) -> Recipe:
     return Recipe.model_validate({"scene": "two_objects", **values})
 
 
-TOO_MUCH: list[tuple[dict[str, Any], str]] = [
+TOO_MUCH: list[tuple[Table, str]] = [
     ({"sensor": {"dark_counts": 1e6}}, "sensor.dark_counts"),
     ({"sensor": {"hot_pixel_share": 0.01, "hot_pixel_counts": 1e9}}, "sensor.hot_pixel_share"),
     ({"grid": {"rows": 10**8}}, "grid.rows"),
