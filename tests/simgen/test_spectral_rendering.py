@@ -11,8 +11,7 @@ from pcii.types import colour_index
 from simgen.dataset import capture_of
 from simgen.renderer import RenderScene, render_view
 from simgen.spec import Recipe
-from simgen.spectral import patch_names
-from simgen.spectral.spectra import colour_science
+from simgen.spectral import colour_science, patch_names
 
 # colour-science says that it interpolates.
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

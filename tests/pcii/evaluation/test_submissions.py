@@ -11,10 +11,10 @@ from zipfile import ZipFile
 import numpy as np
 import pandas as pd
 import pytest
+from command_runs import run_pcii
 
 import pcii
-from pcii.app.commands import app
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.evaluation import (
     SUBMISSION,
     BenchmarkHalf,
@@ -160,18 +160,18 @@ def test_functions_of_ones_own_are_run_each_into_a_folder_of_its_own(
     methods = ("a_method_of_mine.py:everything", "depth:a_method_of_mine:near")
     for method, out in zip(methods, ("masks", "depth"), strict=True):
         command = ["benchmark", "run", method, *options, "--budget", "30"]
-        assert command_line.run(app, [*command, "-o", f"submissions/{out}"]) == 0
+        assert run_pcii(*command, "-o", f"submissions/{out}") == 0
     # The commands that the page prints, with the folder of the benchmark, find the rows and measure nothing.
-    assert command_line.run(app, ["benchmark", "page", "submissions", "-o", "page.html"]) == 0
+    assert run_pcii("benchmark", "page", "submissions", "-o", "page.html") == 0
     commands = re.findall("pcii (benchmark run .*?)</td>", (tmp_path / "page.html").read_text())
     assert [command.split()[2] for command in commands] == [methods[1], methods[0]]
     rows = tmp_path / commands[0].split()[-1] / "rows.jsonl"
     before = rows.stat().st_size
     repeated = commands[0].replace("BENCHMARK", str(small_benchmark)).split()
-    assert command_line.run(app, [*repeated, "--budget", "30"]) == 0
+    assert run_pcii(*repeated, "--budget", "30") == 0
     assert rows.stat().st_size == before
     absent = ["benchmark", "run", methods[0], *options, "--budget", "77", "-o", "other"]
-    assert command_line.run(app, absent) == 2
+    assert run_pcii(*absent) == 2
     assert "no dataset of the development half that" in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
 
@@ -182,7 +182,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     about = {"authors": "B. C.", "url": None, "trained_on": "drawn scenes"}
     run_method("depth:sweep-17", data, folder / "ours", **about)
     edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "net:a; b')(folder / "ours")
-    assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
+    assert run_pcii("benchmark", "page", folder, "-o", out) == 0
     text = out.read_text()
     assert "small: methods compared" in text
     for words in ("mine", "depth:mine", "depth:sweep-17", "B. C.", "drawn scenes"):
@@ -201,7 +201,7 @@ def test_no_page_is_made_of_scores_that_were_changed(
     folder, out = tmp_path / "submissions" / "theirs", tmp_path / "page.html"
     shutil.copytree(scored.folder, folder)
     make(folder)
-    assert command_line.run(app, ["benchmark", "page", str(folder.parent), "-o", str(out)]) == 2
+    assert run_pcii("benchmark", "page", folder.parent, "-o", out) == 2
     assert re.fullmatch(f"error: .*{says}.*\n", capsys.readouterr().err)
     assert not out.exists()
 
@@ -224,7 +224,7 @@ def test_an_unfinished_benchmark_names_the_command_that_goes_on(
     part = shutil.copytree(small_benchmark, tmp_path / "part")
     write_index(part, [row for row in read_index(part) if "photons" not in row["path"]])
     command = ["benchmark", "run", "brightness", "--data", str(part), "-o", str(tmp_path / "out")]
-    assert command_line.run(app, [*command, "--half", HALF]) == 0
+    assert run_pcii(*command, "--half", HALF) == 0
     printed = capsys.readouterr().out
     assert f"{part}: 3 of 5 datasets of the {HALF} half are missing" in printed
     assert f"`simgen benchmark make -o {part}` goes on with it" in printed

@@ -10,7 +10,8 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, check_refused, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, H, W, check_refused, numbers, write
 from PIL import Image
 from png_files import chunk, compressed, png_file
 from rendered_cards import Card, render

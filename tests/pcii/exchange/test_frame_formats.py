@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, check_refused, run
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, check_refused
 from PIL import Image
 
 import pcii

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, check_refused, make_folder, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, H, W, check_refused, make_folder, numbers, write
 from PIL import Image, ImageCms
 from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from picture_folders import OPTICS, check_refused, run
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, check_refused
 from stored_datasets import one_sentence
 from twins import unit_grid
 
 import pcii
 from pcii import CameraGrid, FrameFormat, ViewOrder, import_counts, open_dataset
-from pcii.exchange import count_arrays
 from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
@@ -73,8 +73,8 @@ def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes,
     for shape, share in (((1, 1, 1), 1.0), ((2, 3, 5), 0.0), ((300, 2, 33), 0.5)):
         bits = np.random.default_rng(3).random((1, 1, *shape)) < share
         check_counts(counts_of_bits(bits, (0, shape[0])), bits)
-    monkeypatch.setattr(count_arrays, "MOST_KEPT", most_kept)
-    monkeypatch.setattr(count_arrays, "PIECE_BYTES", piece_bytes)
+    monkeypatch.setattr("pcii.exchange.count_arrays.MOST_KEPT", most_kept)
+    monkeypatch.setattr("pcii.exchange.count_arrays.PIECE_BYTES", piece_bytes)
     counts, seen = counts_of_bits(BITS, span), BITS[:, :, span[0] : span[1]]
     if seen.sum() <= most_kept:
         check_counts(counts, seen)

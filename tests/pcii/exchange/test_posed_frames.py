@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from picture_folders import H, W, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import H, W, numbers, write
 from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 

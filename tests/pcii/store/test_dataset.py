@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray
 import zarr
+from command_runs import run_pcii
 from hostile_names import NAMES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -29,8 +30,7 @@ from stored_datasets import (
 from twins import unit_grid
 
 import pcii
-from pcii.app import commands
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.store import (
     CARD,
     COLLECTION_FOLDER,
@@ -176,9 +176,9 @@ def test_the_sample_is_small_and_whole_and_has_all_that_an_analysis_uses() -> No
 
 def test_a_copy_is_a_dataset_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "copy"
-    assert command_line.run(commands.app, ["sample", "-o", str(out)]) == 0
+    assert run_pcii("sample", "-o", out) == 0
     assert verify(out) == verify(SAMPLE)
-    assert command_line.run(commands.app, ["sample", "-o", str(out)]) == 2
+    assert run_pcii("sample", "-o", out) == 2
     assert f"error: {out}: holds something else; name a new or empty folder" in capsys.readouterr().err
 
 

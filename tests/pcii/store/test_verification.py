@@ -219,6 +219,9 @@ def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None
     assert set(split.unique()["test"]) == {9, 19}
 
 
+SCENE_4, SCENE_5 = "scene_4_seed_1", "scene_5_seed_1"
+
+
 def forge_a_path(folder: Path) -> None:
     rows = [json.loads(line) for line in (folder / INDEX).read_text().splitlines()[:-1]]
     rows[0]["path"] = "../elsewhere"
@@ -229,11 +232,8 @@ def forge_a_path(folder: Path) -> None:
     ("harm", "words"),
     [
         (forge_a_path, "not of a dataset in this folder"),
-        (
-            lambda path: shutil.copy(path / "scene_5_seed_1" / MANIFEST, path / "scene_4_seed_1"),
-            "not the one that",
-        ),
-        (lambda path: shutil.rmtree(path / "scene_4_seed_1"), "missing or unfinished"),
+        (lambda path: shutil.copy(path / SCENE_5 / MANIFEST, path / SCENE_4), "not the one that"),
+        (lambda path: shutil.rmtree(path / SCENE_4), "missing or unfinished"),
     ],
 )
 def test_what_no_checksum_of_a_file_tells_is_refused(

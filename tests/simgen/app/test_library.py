@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run_simgen
 from tiny import GRID_2_X_3, TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.store import verify
 from pcii.types import Readout
-from simgen.app import commands as simgen_cli
 from simgen.app import new_recipe, new_scene
 from simgen.check import lint
 from simgen.spec import Recipe, load_recipe, load_scene
@@ -157,21 +157,18 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
-def run(command: str) -> None:
-    assert command_line.run(simgen_cli.app, command.split()) == 0, command
-
-
 @pytest.mark.renders
 def test_a_scene_and_a_recipe_work_as_they_are_written() -> None:
-    run("new-scene mine")
-    run("new-recipe mine")
+    for command in ("new-scene", "new-recipe"):
+        assert run_simgen(command, "mine") == 0
     for target in ("mine", "data_recipes/mine.toml"):
         _, findings = lint(target)
         assert not [finding.line() for finding in findings if finding.verdict in ("bad", "warn")]
     text = Path("data_recipes/mine.toml").read_text()
     assert "generate data_recipes/mine.toml -o out/mine" in text
-    smaller = "--set grid.rows=2 --set grid.cols=2 --set grid.height=32 --set grid.width=32"
-    run(f"generate data_recipes/mine.toml -o out/mine {smaller} --set render.samples_per_pixel=1")
+    smaller = "grid.rows=2", "grid.cols=2", "grid.height=32", "grid.width=32", "render.samples_per_pixel=1"
+    settings = [f"--set={setting}" for setting in smaller]
+    assert run_simgen("generate", "data_recipes/mine.toml", "-o", "out/mine", *settings) == 0
     assert verify(Path("out/mine")) > 0
 
 
@@ -225,7 +222,7 @@ def test_lists_name_what_is_there_and_a_broken_file_does_not_hide_the_others(
     for file in (Path("scenes/mine/scene.toml"), Path("data_recipes/mine.toml")):
         file.parent.mkdir(parents=True)
         file.write_text("titel = 3")
-    run("scenes")
+    assert run_simgen("scenes") == 0
     parts = capsys.readouterr().out.split("Recipes, of")
     for listed, name in zip(parts, ("two_objects", "paper"), strict=True):
         lines = {line.split()[0]: line for line in listed.splitlines() if line}

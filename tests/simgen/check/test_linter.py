@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from command_runs import run_simgen
 from lit_scenes import LAMP, ball
 
-from pcii.base import command_line
-from simgen.app import commands as cli
 from simgen.cameras import coarser, disparities_px
 from simgen.check import Facts, Finding, ObjectFacts, findings, probe_scene
 from simgen.dataset import Prepared, peak_bytes, product_bytes
@@ -250,7 +249,7 @@ def test_a_coarser_film_has_the_same_field_of_view() -> None:
 
 @pytest.mark.renders
 def test_the_small_recipe_passes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command_line.run(cli.app, ["check", "small", "--set", "seed=3", "--json"]) == 0
+    assert run_simgen("check", "small", "--set", "seed=3", "--json") == 0
     rows = json.loads(capsys.readouterr().out)
     # Its shifts at 540 mm are multiples of 12 px but for rounding: -30, -18, -6, 6, 18, 30.
     assert {row["subject"] for row in rows if row["verdict"] != "ok"} == {"colours"}
@@ -263,13 +262,13 @@ def test_exit_codes_of_broken_scenes(capsys: pytest.CaptureFixture[str], tmp_pat
     lost = ball("lost", 0, -500, GREY, radius_mm=20)
     text = tomli_w.dumps({"title": "broken", "objects": [lost], "lights": [SKY]})
     file.write_text(text)
-    assert command_line.run(cli.app, ["check", str(file)]) == 1
+    assert run_simgen("check", file) == 1
     output = capsys.readouterr()
     assert "lost is at z = -520 to -480 mm" in output.out
     assert output.err == ""
     file.write_text(text.replace("radius_mm", "radius"))
     for target, words in ((tmp_path, "radius"), ("nowhere", "there is no scene or recipe 'nowhere'")):
-        assert command_line.run(cli.app, ["check", str(target)]) == 2
+        assert run_simgen("check", target) == 2
         assert words in capsys.readouterr().err
-    assert command_line.run(cli.app, ["check", "two_objects", "--set", "seed=1"]) == 2
+    assert run_simgen("check", "two_objects", "--set", "seed=1") == 2
     assert "name a recipe" in capsys.readouterr().err

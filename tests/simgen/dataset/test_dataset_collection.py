@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_runs import run_simgen
 from digests import digest
 from small_benchmark import SCENE, written
 from tiny import GRID_2_X_3
 
 import pcii
-from pcii.base import Executor, InputError, WorkerLostError, command_line, locked
+from pcii.base import Executor, InputError, WorkerLostError, locked
 from pcii.store import (
     CARD,
     CERTIFICATE,
@@ -28,7 +29,6 @@ from pcii.store import (
     provenance,
     verify,
 )
-from simgen.app import commands as cli
 from simgen.dataset import (
     Definition,
     certify,
@@ -55,7 +55,7 @@ def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def collection(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("collection") / "six"
-    assert command_line.run(cli.app, ["generate", str(recipe_file), "-o", str(out), "--seeds", "3"]) == 0
+    assert run_simgen("generate", recipe_file, "-o", out, "--seeds", "3") == 0
     return out
 
 
@@ -106,10 +106,10 @@ def test_a_dataset_that_cannot_be_made_holds_up_no_other(
 ) -> None:
     out = tmp_path / "out"
     command = ["generate", str(recipe_file), "-o", str(out), "--set", "photons.budget=100", "--seeds", "1"]
-    assert command_line.run(cli.app, command) == 0
+    assert run_simgen(*command) == 0
     (out / "seed_8").mkdir()
     (out / "seed_8" / "notes.txt").write_text("mine")
-    assert command_line.run(cli.app, [*command[:-1], "3"]) == 1
+    assert run_simgen(*command[:-1], "3") == 1
     output = capsys.readouterr()
     assert "2 of 3 datasets are finished" in output.out
     assert "seed_8: holds something else" in output.err
@@ -240,9 +240,9 @@ def test_scenes_that_are_not_there_are_named(
     made: tuple[Definition, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["benchmark", "make", str(made[1]), "-o", str(tmp_path / "x"), "--scene", "pear"]
-    assert command_line.run(cli.app, arguments) == 2
+    assert run_simgen(*arguments) == 2
     assert "small has no 'pear'; did you mean 'pair'?" in capsys.readouterr().err
-    assert command_line.run(cli.app, [*arguments[:-1], "pair", "--half", "test"]) == 2
+    assert run_simgen(*arguments[:-1], "pair", "--half", "test") == 2
     assert "none of these scenes is in the test half" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
 

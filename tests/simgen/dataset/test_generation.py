@@ -18,8 +18,9 @@ from zarr.storage import ZipStore
 from pcii.base import InputError, silent
 from pcii.store import ARRAYS, MANIFEST, MARKER, RADIANCE, TRUTH, open_dataset, provenance, verify
 from simgen.cameras import rig_of
-from simgen.dataset import Prepared, generate, generation, prepare, rendered_views
+from simgen.dataset import Prepared, generate, generation, prepare
 from simgen.dataset.generation import Reuse, make
+from simgen.renderer import render_view
 from simgen.spec import Recipe, load_recipe
 
 pytestmark = pytest.mark.renders
@@ -98,15 +99,14 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, views = tmp_path / "killed", list[object]()
-    original = rendered_views.render_view
 
     def dies_at_the_fourth(*args: object, **kwargs: object) -> np.ndarray:
         views.append(args[2:4])
         if len(views) == 4:
             raise KeyboardInterrupt
-        return original(*args, **kwargs)  # type: ignore[arg-type]
+        return render_view(*args, **kwargs)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(rendered_views, "render_view", dies_at_the_fourth)
+    monkeypatch.setattr("simgen.dataset.rendered_views.render_view", dies_at_the_fourth)
     with pytest.raises(KeyboardInterrupt):
         generate(recipe(), Path(), out)
     assert not (out / MANIFEST).exists()
@@ -153,7 +153,7 @@ def test_what_other_software_made_is_refused_and_untouched(
         raise KeyboardInterrupt
 
     out, original = tmp_path / "begun", provenance.version
-    monkeypatch.setattr(rendered_views, "render_view", killed)
+    monkeypatch.setattr("simgen.dataset.rendered_views.render_view", killed)
     with pytest.raises(KeyboardInterrupt):
         generate(recipe(), Path(), out)
     monkeypatch.setattr(provenance, "version", lambda name: "9.9" if name == "mitsuba" else original(name))

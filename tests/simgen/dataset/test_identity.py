@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import tomli_w
 import zarr
+from command_runs import run_simgen
 from tiny import TINY_RECIPE
 
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.store import TRUTH, provenance
-from simgen.app import commands as cli
 from simgen.dataset import Prepared, check_resources, generate, peak_bytes, prepare, shortage
 from simgen.photons import Plan
 from simgen.spec import Analysis, Recipe
@@ -224,10 +224,10 @@ def test_a_disk_that_is_too_small_is_named_unless_views_are_there(
 @pytest.mark.renders
 def test_commands_refuse_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     setting, out = "sensor.dark_counts=1e6", tmp_path / "out"
-    assert command_line.run(cli.app, ["check", "paper", "--set", setting]) == 1
+    assert run_simgen("check", "paper", "--set", setting) == 1
     sentence = "sensor.dark_counts: takes some 21000 TB of memory, and this machine has"
     assert f"bad   memory      {sentence}" in capsys.readouterr().out
-    assert command_line.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
+    assert run_simgen("generate", "paper", "--set", setting, "-o", out) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"error: {sentence}")
     assert error.count("\n") == 1

@@ -198,12 +198,7 @@ def test_one_sentence_says_what_is_wrong(content: bytes, sentence: str, tmp_path
         ("a.fbx", "out", {}, r"expected a glTF file \(.glb or .gltf\)"),
         ("b.glb", "out", {}, "there is no such file"),
         ("a.stl", "out", {}, "--unit: .* has no unit of length"),
-        (
-            "a.stl",
-            "out",
-            MM | {"place_at_mm": None},
-            "has no camera; say where the middle of its 2 x 4 x 6 mm",
-        ),
+        ("a.stl", "out", NOWHERE, "has no camera; say where the middle of its 2 x 4 x 6 mm"),
         ("cut.stl", "out", MM, "has no faces|cut off"),
         ("empty.obj", "out", MM, "has no faces"),
         ("none.ply", "out", MM, "cannot be read"),

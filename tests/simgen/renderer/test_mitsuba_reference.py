@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run_simgen
 from lit_scenes import ball
 from PIL import Image
 
 import simgen
 from pcii import Optics
-from pcii.base import LUMINANCE, InputError, command_line
+from pcii.base import LUMINANCE, InputError
 from pcii.types import CameraGrid
-from simgen.app import commands as simgen_cli
 from simgen.renderer import backend, reference_to
 from simgen.spec import MitsubaFile
 
@@ -376,6 +376,6 @@ def test_without_mitsuba_one_sentence_says_what_to_install(
     find: Callable[..., object] = importlib.util.find_spec
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "mitsuba" else find(name))
     monkeypatch.chdir(tmp_path)
-    assert command_line.run(simgen_cli.app, command.split()) == 2
+    assert run_simgen(*command.split()) == 2
     sentence = "error: mitsuba: not installed, and needed for rendering; type in the source tree:  "
     assert capsys.readouterr().err == sentence + "pip install '.[render]'\n"

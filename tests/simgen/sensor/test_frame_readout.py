@@ -143,14 +143,9 @@ Draw = Callable[[Recipe, RenderScene], PhotonTable]
 
 
 def recipe(**changes: object) -> Recipe:
-    values = {
-        "scene": "made up",
-        "seed": 1,
-        "grid": {"rows": 1, "cols": 2, "height": 64, "width": 80, "pixel_mm": PIXEL_MM},
-        "photons": {"scope": "exposure"},
-        "exposure": {"f_number": F_NUMBER, "time_s": TIME_S},
-    }
-    return Recipe.model_validate(values | changes)
+    grid = {"rows": 1, "cols": 2, "height": 64, "width": 80, "pixel_mm": PIXEL_MM}
+    exposed = {"photons": {"scope": "exposure"}, "exposure": {"f_number": F_NUMBER, "time_s": TIME_S}}
+    return Recipe.model_validate({"scene": "made up", "seed": 1, "grid": grid} | exposed | changes)
 
 
 @pytest.fixture(scope="module")
