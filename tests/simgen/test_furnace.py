@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_scenes import EVENLY, SCALAR, ball, build_scene, card, film, seen, sky, surprise, thinned
+from lit_scenes import EVENLY, SCALAR, ball, build_scene, card, film, seen, sky, surprise, thinned, white
 
 from simgen.renderer import RenderScene
 
@@ -34,6 +34,14 @@ def test_what_absorbs_nothing_is_as_bright_as_its_surroundings(reflectance: Any,
     # Each corner of the view has one thing in it, or the card alone.
     quarters = view.reshape(2, 16, 2, 16, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(quarters, 1, atol=2 * 1e-3)
+
+
+def test_thinned_photons_see_nothing_in_the_furnace() -> None:
+    # A ball alone, so that short paths leave nothing out.
+    built = build_scene(things({"reflectance": TELLS_NOTHING})[:1], [EVENLY], spectral=True)
+    gain = (5_000 if SCALAR else 200_000) / GRID.height / GRID.width / white(built).mean()
+    photons, _ = thinned(built, GRID, gain)
+    assert abs(surprise(photons, np.ones((32, 32, 3)) * white(built), GRID, gain, block_px=32)) < 5
 
 
 @pytest.mark.parametrize(("roughness", "spectral"), [(0.01, False), (0.1, True), (0.5, False)])
