@@ -163,8 +163,8 @@ def test_a_cube_in_three_channels_is_a_mosaic(tmp_path: Path, capsys: Any) -> No
 def test_offset_and_gain_of_a_camera(tmp_path: Path) -> None:
     photons = np.random.default_rng(9).poisson(0.05, (3, 3, 32, 32))
     stored = np.round(100 + RNG.normal(0, 2, photons.shape) + 12 * photons).astype(np.uint16)
-    (_, notes) = imported_with_notes(stored)
-    assert re.search("no number of array is below 9.*--offset", *notes)
+    _, (sentence,) = imported_with_notes(stored)
+    assert re.search("no number of array is below 9.*--offset", sentence)
     counts, notes = imported_with_notes(stored, stored=FrameFormat(offset=100, gain=12))
     assert (counts.dense != photons).mean() < 0.005  # noise of 3 of its standard deviations is half a photon
     assert notes == []
