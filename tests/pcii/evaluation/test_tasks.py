@@ -161,7 +161,8 @@ def test_every_package_that_computes_is_recorded() -> None:
                 elif isinstance(node, ast.ImportFrom) and node.module:
                     imported.add(node.module)
     roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
-    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
+    distributions = packages_distributions()
+    packages = {name for root in roots for name in distributions.get(root, [root])}
     assert packages - DRAWS_TALKS_OR_LOADS <= set(own_software())
 
 
