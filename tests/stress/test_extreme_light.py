@@ -28,6 +28,8 @@ def constant(value: float, dtype: type = np.float64, channels: int = 1) -> pcii.
         (0.0, np.float32),
         (5e-324, np.float64),  # the smallest numbers above 0, which have one bit
         (1e-45, np.float32),
+        (6e-8, np.float16),
+        (1e-300, np.float64),
         (-3.0, np.float32),
         (65504.0, np.float16),
         (1e30, np.float32),
