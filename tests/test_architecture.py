@@ -276,14 +276,16 @@ def test_no_module_shares_its_name_with_a_function() -> None:
             assert not functions & leaves, f"{name}: {sorted(functions & leaves)}"
 
 
-def test_importing_pcii_loads_no_renderer_and_no_compiler() -> None:
+def test_importing_pcii_and_simgen_loads_no_renderer_and_no_compiler() -> None:
     script = (
         "import sys, pcii, numpy as np;"
         "grid = pcii.CameraGrid(rows=1, cols=2, pitch_mm=(1, 1), focal_mm=1, pixel_mm=1, height=2, width=2);"
         "repr(pcii.PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid));"
         "heavy = {'mitsuba', 'drjit', 'colour', 'numba', 'pydantic', 'zarr', 'simgen'};"
         "drawing = {'matplotlib', 'PIL', 'pandas'};"  # loaded by the first picture
-        "print(*(heavy | drawing) & {*sys.modules})"
+        "print(*(heavy | drawing) & {*sys.modules});"
+        "import simgen;"
+        "print(*{'mitsuba', 'drjit', 'pydantic'} & {*sys.modules})"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

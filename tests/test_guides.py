@@ -67,10 +67,6 @@ def given_cluster(request: pytest.FixtureRequest) -> None:
     monkeypatch.setitem(sys.modules, "dask_jobqueue", SimpleNamespace(SLURMCluster=lambda **options: cluster))
 
 
-def given_scenes(request: pytest.FixtureRequest) -> None:
-    Path("scenes/mine").mkdir(parents=True)
-
-
 def given_imported_scenes(request: pytest.FixtureRequest) -> None:
     Path("scenes/set_table").mkdir(parents=True)
     shutil.copy(ROOT / "scenes" / "set_table" / "set_table.glb", "scenes/set_table")
@@ -104,7 +100,7 @@ GIVEN: dict[str, Callable[[pytest.FixtureRequest], None]] = {
     "training.md": given_training,
     "exchange.md": given_exchange,
     "cluster.md": given_cluster,
-    "scenes.md": given_scenes,
+    "scenes.md": lambda _: Path("scenes/mine").mkdir(parents=True),
     "imported_scenes.md": given_imported_scenes,
     "plugins.md": given_plugins,
     "your_own_images.md": given_your_own_images,

@@ -93,13 +93,8 @@ def test_what_is_trained_and_exported_says_the_same_masks(tmp_path: Path, monkey
 
 
 # Median plane, planes that it reaches over, share of the film.
-NEAR, FAR, BETWEEN, LEANING, AWAY = (
-    (11.0, 3.0, 0.1),
-    (39.0, 3.0, 0.1),
-    (19.0, 3.0, 0.1),
-    (12.0, 20.0, 0.1),
-    (60.0, 2.0, 0.1),
-)
+NEAR, FAR, BETWEEN = ((plane, 3.0, 0.1) for plane in (11.0, 39.0, 19.0))
+LEANING, AWAY = (12.0, 20.0, 0.1), (60.0, 2.0, 0.1)
 
 
 def test_an_object_belongs_to_the_nearest_requested_plane_or_to_none() -> None:

@@ -7,6 +7,7 @@ import pytest
 from property_settings import mostly_slow
 from twins import even_light
 
+from pcii import Optics
 from pcii.depth import estimate_depth
 from pcii.metrics import score
 from pcii.removal import METHODS, segment
@@ -21,35 +22,13 @@ MOST_FALSE = 1 / 1000  # what both methods promise of noise, as a share of pixel
 
 
 def grid_of(views: tuple[int, int], size: tuple[int, int]) -> CameraGrid:
-    rows, cols = views
-    height, width = size
-    return CameraGrid(
-        rows=rows, cols=cols, pitch_mm=(18.0, 18.0), focal_mm=50.0, pixel_mm=0.5, height=height, width=width
-    )
+    return Optics(pitch_mm=(18.0, 18.0), focal_mm=50.0, pixel_mm=0.5).grid((*views, *size))
 
 
 def answered(counts: PhotonCounts) -> tuple[float, float]:
     """Shares of pixels that the depth map answers, and that removal claims."""
     depth, focus = estimate_depth(counts, RANGE_MM), segment(counts, Z_MM, method="posterior")
     return float(np.isfinite(depth.z_mm).mean()), float(focus.in_focus.mean())
-
-
-def noise(
-    views: tuple[int, int], size: tuple[int, int], rate: float, cfa: str | None, seed: int
-) -> PhotonCounts:
-    return even_light(grid_of(views, size), rate, seed, cfa)
-
-
-def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, seed: int) -> PhotonCounts:
-    """Even light, and some hot pixels, of one view each or of all."""
-    grid, rng = grid_of(views, (64, 72)), np.random.default_rng(seed)
-    film = rng.poisson(rate, grid.shape_KLHW)
-    # No two are adjacent: hot pixels are recognised by their neighbours.
-    for place in rng.choice(8 * 9, pixels, replace=False):
-        i, j = 8 * (place // 9) + 2, 8 * (place % 9) + 2
-        view = np.s_[:, :] if everywhere else (rng.integers(views[0]), rng.integers(views[1]))
-        film[*view, i, j] += HOT
-    return PhotonCounts.from_dense(film, grid, cfa=None)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +39,8 @@ def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, s
     ),
 )
 def test_even_light_is_not_answered(size, rate):
-    draws = [noise(views, size, rate, cfa, 0) for views, cfa in zip(GRIDS, itertools.cycle(["GRBG", None]))]
+    grids = zip(GRIDS, itertools.cycle(["GRBG", None]))
+    draws = [even_light(grid_of(views, size), rate, 0, cfa) for views, cfa in grids]
     depth, claimed = np.mean([answered(counts) for counts in draws], axis=0)
     assert depth <= MOST_FALSE
     assert claimed <= MOST_FALSE
@@ -69,9 +49,16 @@ def test_even_light_is_not_answered(size, rate):
 @pytest.mark.parametrize("everywhere", [False, True])
 @pytest.mark.parametrize("rate", [0.0, 1.0])
 def test_hot_pixels_are_not_answered(rate, everywhere):
+    """Of one view each, or of all."""
     for views in ((5, 5), (2, 1)):
-        counts = hot(views, rate, 4, everywhere=everywhere, seed=0)
-        assert max(answered(counts)) <= MOST_FALSE
+        grid, rng = grid_of(views, (64, 72)), np.random.default_rng(0)
+        film = rng.poisson(rate, grid.shape_KLHW)
+        # No two are adjacent: hot pixels are recognised by their neighbours.
+        for place in rng.choice(8 * 9, 4, replace=False):
+            i, j = 8 * (place // 9) + 2, 8 * (place % 9) + 2
+            view = np.s_[:, :] if everywhere else (rng.integers(views[0]), rng.integers(views[1]))
+            film[*view, i, j] += HOT
+        assert max(answered(PhotonCounts.from_dense(film, grid, cfa=None))) <= MOST_FALSE
 
 
 BUDGETS = [1e3, 1e7, None]  # photons per view; None is full light

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from photon_statistics import counted
 
+from pcii import Optics
 from pcii.store import write_exr_safely
 from pcii.types import CameraGrid, colour_index, mosaic
 from simgen.cameras import Cameras
@@ -34,22 +35,12 @@ MATT: dict[str, Any] = {"reflectance": WHITE}
 
 
 def grid(rows: int, cols: int, height: int, width: int, pixel_mm: float = 0.0704) -> CameraGrid:
-    return CameraGrid(
-        rows=rows,
-        cols=cols,
-        pitch_mm=(6.0, 4.0),
-        focal_mm=50.0,
-        pixel_mm=pixel_mm,
-        height=height,
-        width=width,
-    )
+    return Optics(pitch_mm=(6.0, 4.0), focal_mm=50.0, pixel_mm=pixel_mm).grid((rows, cols, height, width))
 
 
 def film(height: int = 32, width: int = 32, focal_mm: float = 50.0) -> CameraGrid:
     """One camera with pixels of 1 mm."""
-    return CameraGrid(
-        rows=1, cols=1, pitch_mm=(1, 1), focal_mm=focal_mm, pixel_mm=1.0, height=height, width=width
-    )
+    return Optics(pitch_mm=(1, 1), focal_mm=focal_mm, pixel_mm=1.0).grid((1, 1, height, width))
 
 
 def ball(

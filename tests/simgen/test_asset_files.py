@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import zlib
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
+from command_runs import run_simgen
 from PIL import Image, ImageOps
 from plyfile import PlyData
 from png_files import png16, png_file
 
-from pcii.base import InputError, command_line, srgb_to_linear
+from pcii.base import InputError, srgb_to_linear
 from pcii.store import write_exr_safely
-from simgen.app import commands
 from simgen.assets import Assets, Triangles, ply_bytes, read_assets, read_mesh
 from simgen.spec import load_scene
 
@@ -256,10 +257,6 @@ def test_the_command_leaves_with_2_and_one_line(tmp_path: Path, capfd: pytest.Ca
     (tmp_path / "thing.ply").write_bytes(b"nonsense")
     with pytest.raises(InputError):
         assets_with(tmp_path, "thing.ply")
-    arguments = ["preview", str(tmp_path), "-o", str(tmp_path / "x.png")]
-    assert command_line.run(commands.app, arguments) == 2
-    error = capfd.readouterr().err
-    assert error.startswith("error: ")
-    assert "thing.ply" in error
-    assert error.count("\n") == 1
+    assert run_simgen("preview", tmp_path, "-o", tmp_path / "x.png") == 2
+    assert re.fullmatch("error: .*thing.ply.*\n", capfd.readouterr().err)
     assert not (tmp_path / "x.png").exists()

@@ -16,12 +16,7 @@ from simgen.spec import Recipe
 pytestmark = pytest.mark.renders
 CENTRE_MM, RADIUS_MM, WALL_MM = (12.0, -21.0, 500.0), 30.0, 800.0
 BALL = ball("ball", 12.0, 500.0, (0.8, 0.8, 0.8), RADIUS_MM, -21.0)
-SCENE = {
-    "title": "A ball up to the right",
-    "lights": [EVENLY],
-    "objects": [BALL],
-    "backdrop": {"z_mm": WALL_MM},
-}
+SCENE = {"title": "Up to the right", "lights": [EVENLY], "objects": [BALL], "backdrop": {"z_mm": WALL_MM}}
 GRID = {"rows": 2, "cols": 3, "pitch_mm": [18.0, 12.0], "pixel_mm": 0.5, "height": 40, "width": 50}
 SHEARED = {"shear_px": [3.0, -2.0]}
 ERRORS = {"errors": {"position_sd_mm": [1.0, 1.0, 5.0], "rotation_sd_deg": [1.0, 1.0, 5.0]}}
@@ -43,12 +38,8 @@ def points_mm(folder: Path, frame: dict[str, Any]) -> np.ndarray:
 def test_pixels_of_all_cameras_see_the_same_ball_and_wall(tmp_path: Path, grid: dict[str, Any]) -> None:
     (tmp_path / "ball").mkdir()
     (tmp_path / "ball" / "scene.toml").write_text(tomli_w.dumps(SCENE))
-    values = {
-        "scene": "ball",
-        "grid": GRID | grid,
-        "products": {"view_truth": ["z_mm"], "counts": False, "radiance": "rgb"},
-        "render": {"samples_per_pixel": 1},
-    }
+    products = {"view_truth": ["z_mm"], "counts": False, "radiance": "rgb"}
+    values = {"scene": "ball", "grid": GRID | grid, "products": products, "render": {"samples_per_pixel": 1}}
     generate(Recipe.model_validate(values), tmp_path, tmp_path / "data")
     folder = export_dataset(tmp_path / "data", "nerfstudio", tmp_path / "posed")
     top = json.loads((folder / "transforms.json").read_text())

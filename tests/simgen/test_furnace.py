@@ -1,8 +1,4 @@
-"""The furnace: in light that is the same from everywhere, what absorbs nothing cannot be seen.
-
-Whatever a surface sends back it was sent, so that a scene of reflectance 1 has the radiance of its
-surroundings everywhere; what absorbs is darker, and nothing is brighter. Glass reflects what Fresnel says.
-"""
+"""The furnace: in light that is the same from everywhere, what absorbs nothing cannot be seen."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +7,6 @@ import numpy as np
 import pytest
 from lit_scenes import EVENLY, SCALAR, ball, build_scene, card, film, seen, sky, surprise, thinned, white
 
-from pcii.types import colour_index
 from simgen.renderer import RenderScene
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
@@ -29,9 +24,7 @@ def things(material: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize(
-    ("reflectance", "spectral"),
-    [([1, 1, 1], False), (TELLS_NOTHING, True), ([1, 1, 1], True)],
-    ids=["colours", "spectra", "colours made spectra"],
+    ("reflectance", "spectral"), [([1, 1, 1], False), (TELLS_NOTHING, True), ([1, 1, 1], True)]
 )
 def test_what_absorbs_nothing_is_as_bright_as_its_surroundings(reflectance: Any, spectral: bool) -> None:
     built = build_scene(things({"reflectance": reflectance}), [EVENLY], spectral=spectral, max_depth=DEPTH)
@@ -48,10 +41,7 @@ def test_thinned_photons_see_nothing_in_the_furnace() -> None:
     built = build_scene(things({"reflectance": TELLS_NOTHING})[:1], [EVENLY], spectral=True)
     gain = (5_000 if SCALAR else 200_000) / GRID.height / GRID.width / white(built).mean()
     photons, _ = thinned(built, GRID, gain)
-    colours = colour_index(GRID.height, GRID.width, "GRBG")
-    found = np.bincount(colours[photons.i, photons.j], minlength=3)
-    expected = gain * white(built) * np.bincount(colours.ravel())
-    assert (np.abs(found - expected) < 4 * np.sqrt(expected)).all(), found / expected
+    assert abs(surprise(photons, np.ones((32, 32, 3)) * white(built), GRID, gain, block_px=32)) < 5
 
 
 @pytest.mark.parametrize(("roughness", "spectral"), [(0.01, False), (0.1, True), (0.5, False)])
@@ -71,12 +61,9 @@ def test_plastic_gives_no_more_than_it_gets(roughness: float, spectral: bool) ->
 @pytest.mark.parametrize(("pane", "spectral"), [(False, False), (True, False), (False, True)])
 def test_glass_in_the_furnace_cannot_be_seen(pane: bool, spectral: bool) -> None:
     material: dict[str, Any] = {"finish": {"type": "glass"}}
-    turn_deg = (0.0, 30.0, 0.0)
-    glass = (
-        card(300, 150, material, turn_deg=turn_deg)
-        if pane
-        else ball("ball", 0, 300, radius_mm=80, **material)
-    )
+    glass = ball("ball", 0, 300, radius_mm=80, **material)
+    if pane:
+        glass = card(300, 150, material, turn_deg=(0.0, 30.0, 0.0))
     view = seen(build_scene([glass], [EVENLY], spectral=spectral, max_depth=DEPTH), GRID, 256)
     # Every path brings 1 but those that are given up or still inside after 12 segments, one in 100 000.
     # The wavelengths that are drawn vary by 0.3 (half a million paths in all, and 256 in a pixel).

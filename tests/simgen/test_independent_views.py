@@ -27,27 +27,16 @@ BACKDROP = {"z_mm": 500.0, "reflectance": [0.8, 0.8, 0.8]}
 WALL: dict[str, Any] = {"title": "An evenly lit wall", "lights": [NEAR_LAMP], "backdrop": BACKDROP}
 LIGHT_ALONE = {"title": "Light", "lights": [EVENLY | {"luminance_cd_m2": 100.0}]}
 # Cameras so close together that all see the same.
-GRID = {
-    "rows": CAMERAS,
-    "cols": CAMERAS,
-    "pitch_mm": [1e-3, 1e-3],
-    "pixel_mm": 0.3,
-    "height": SIDE,
-    "width": SIDE,
-}
+GRID = {"rows": CAMERAS, "cols": CAMERAS, "height": SIDE, "width": SIDE, "pitch_mm": [1e-3, 1e-3]}
+GRID |= {"pixel_mm": 0.3}
 
 
 def dataset(folder: Path, scene: dict[str, Any] = WALL, **changes: Any) -> Path:
     (folder / "wall").mkdir()
     (folder / "wall" / "scene.toml").write_text(tomli_w.dumps(scene))
-    values: dict[str, Any] = {
-        "scene": "wall",
-        "seed": 11,
-        "grid": GRID,
-        "render": {"samples_per_pixel": 1, "max_depth": 2},
-        "products": {"truth": False, "radiance": "mosaic"},
-    }
-    generate(Recipe.model_validate(values | changes), folder, folder / "out")
+    products, render = {"truth": False, "radiance": "mosaic"}, {"samples_per_pixel": 1, "max_depth": 2}
+    values: dict[str, Any] = {"scene": "wall", "seed": 11, "grid": GRID, "render": render}
+    generate(Recipe.model_validate(values | {"products": products} | changes), folder, folder / "out")
     return folder / "out"
 
 

@@ -65,12 +65,8 @@ def test_a_points_light_falls_off_with_the_square_and_the_cosine() -> None:
     assert abs(view.mean() / (1.01 * expected.mean()) - 1) > 5e-4
 
 
-SPOT = point(150.0, -80.0, 100.0, 2.5) | {
-    "type": "spot",
-    "target_mm": (20.0, 10.0, Z_MM),
-    "beam_deg": 8.0,
-    "cutoff_deg": 20.0,
-}
+SPOT = point(150.0, -80.0, 100.0, 2.5) | {"type": "spot", "target_mm": (20.0, 10.0, Z_MM)}
+SPOT |= {"beam_deg": 8.0, "cutoff_deg": 20.0}
 
 
 def cone_of_the_spot(towards: np.ndarray) -> np.ndarray:
@@ -97,9 +93,8 @@ def test_parallel_light_is_even_and_throws_a_shadow_along_its_direction(spectral
     grey = {"reflectance": {"wavelength_nm": (400, 700), "value": (RHO, RHO)}}
     blind = card(Z_MM - 40, 60.0, {"reflectance": [0, 0, 0]}) | {"name": "blind"}
     # Both stand where a camera without parallax sees them: the blind at (0, 0), its shadow 40 mm behind it.
-    view = seen(
-        build_scene([card(Z_MM, 600.0, grey), blind], [DIRECTIONAL], spectral=spectral), GRID, 256
-    ).mean(axis=2)
+    built = build_scene([card(Z_MM, 600.0, grey), blind], [DIRECTIONAL], spectral=spectral)
+    view = seen(built, GRID, 256).mean(axis=2)
     lit = 40.0 * 1.5 / np.linalg.norm(DIRECTIONAL["direction"]) * RHO / np.pi
     at_mm = (np.arange(32) - 15.5) * (Z_MM / 50.0)
     y, x = np.meshgrid(at_mm, at_mm, indexing="ij")
@@ -163,7 +158,6 @@ def test_light_that_does_not_reach_the_plane_is_refused(tmp_path: Path) -> None:
             build_scene([FLAT], [light], folder=tmp_path, level=level)
 
 
-WALL = card(500.0, 600.0, {"reflectance": [0.6] * 3})
 L = 1000.0
 
 
@@ -183,10 +177,8 @@ def test_a_card_that_shines_is_an_area_light() -> None:
     target_mm = tuple(PANEL["position_mm"] + 100 * towards)
     lamp = LAMP | {"position_mm": PANEL["position_mm"], "target_mm": target_mm, "luminance_cd_m2": L}
     lamp |= {"width_mm": 90.0, "height_mm": 50.0}
-    by_lamp, by_card = (
-        seen(build_scene([WALL], [lamp]), GRID, 256),
-        seen(build_scene([WALL, PANEL], []), GRID, 256),
-    )
+    scenes = build_scene([FLAT], [lamp]), build_scene([FLAT, PANEL], [])
+    by_lamp, by_card = (seen(built, GRID, 256) for built in scenes)
     assert by_lamp.mean() > 1
     np.testing.assert_allclose(by_card, by_lamp, rtol=0.04)
     np.testing.assert_allclose(by_card.mean(), by_lamp.mean(), rtol=2e-3)
@@ -204,7 +196,7 @@ def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
         thing = shining({"type": "card", "width_mm": 90.0, "height_mm": 50.0}, {"texture": "a.png"})
     # In sight, so that its own light is among what is counted.
     thing = thing | {"position_mm": (60.0, -120.0, 450.0)}
-    built = build_scene([WALL, thing], [], max_depth=3, folder=tmp_path)
+    built = build_scene([FLAT, thing], [], max_depth=3, folder=tmp_path)
     view = seen(built, GRID, 1024)
     gain = 20_000 / view.mean() / GRID.height / GRID.width
     photons, _ = thinned(built, GRID, gain)
@@ -221,9 +213,8 @@ def test_the_level_counts_what_shines() -> None:
     """A ball behind the cameras lights the wall."""
     behind = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, -200.0)}
     level = {"illuminance_lux": 300.0, "z_mm": 500.0}
-    view = seen(build_scene([WALL, behind], [], level=level), GRID, 256)
-    reflectance = float(srgb_to_linear(np.array(0.6)))
-    assert view[15:17, 15:17].mean() == pytest.approx(reflectance / np.pi * 300, rel=0.01)
+    view = seen(build_scene([FLAT, behind], [], level=level), GRID, 256)
+    assert view[15:17, 15:17].mean() == pytest.approx(RHO / np.pi * 300, rel=0.01)
 
 
 def test_an_image_shines_where_it_is_bright(tmp_path: Path) -> None:
@@ -231,17 +222,11 @@ def test_an_image_shines_where_it_is_bright(tmp_path: Path) -> None:
     half = round(255 * 0.735357)  # sRGB of 0.5
     Image.fromarray(np.array([[[half, 0, 0]] * 8 + [[0, 0, 0]] * 8] * 8, np.uint8)).save(tmp_path / "a.png")
     shape = {"type": "card", "width_mm": 200.0, "height_mm": 100.0}
-    screen = shining(
-        shape, {"texture": "a.png"}, rotation_deg=(180.0, 0.0, 0.0), position_mm=(0.0, -300.0, 300.0)
-    )
-    luminance = 0.5 * L * LUMINANCE[0]
-    alone = shining(
-        shape | {"width_mm": 100.0},
-        {"illuminant": [1.0, 0.0, 0.0], "luminance_cd_m2": luminance},
-        rotation_deg=(180.0, 0.0, 0.0),
-        position_mm=(-50.0, -300.0, 300.0),
-    )
-    views = [seen(build_scene([WALL, thing], [], folder=tmp_path), GRID, 256) for thing in (screen, alone)]
+    turned = {"rotation_deg": (180.0, 0.0, 0.0)}
+    screen = shining(shape, {"texture": "a.png"}, position_mm=(0.0, -300.0, 300.0), **turned)
+    red = {"illuminant": [1.0, 0.0, 0.0], "luminance_cd_m2": 0.5 * L * LUMINANCE[0]}
+    alone = shining(shape | {"width_mm": 100.0}, red, position_mm=(-50.0, -300.0, 300.0), **turned)
+    views = [seen(build_scene([FLAT, thing], [], folder=tmp_path), GRID, 256) for thing in (screen, alone)]
     assert (views[0][..., 0] > 0).all()
     assert not views[0][..., 1:].any()
     np.testing.assert_allclose(views[0], views[1], rtol=0.1)
@@ -349,18 +334,16 @@ def test_an_image_of_ones_is_uniform_light(spectral: bool, tmp_path: Path) -> No
     # By itself: the renderer's table of D65 and ours differ by 0.1 %.
     bare = seen(lit(ones, []), film(), 512 if spectral else 1).mean(axis=(0, 1))
     np.testing.assert_allclose(bare, 1, rtol=4e-3 if spectral else 1e-6)
-    samples = 256
     uniform, around = lit(EVENLY, THINGS), lit(ones, THINGS)
-    expected, found = (seen(one, film(), samples, seed) for seed, one in enumerate((uniform, around)))
+    expected, found = (seen(one, film(), 256, seed) for seed, one in enumerate((uniform, around)))
     blocks = [one.reshape(4, 8, 4, 8, 3).mean(axis=(1, 3)) for one in (expected, found)]
     # Of 16 000 paths a block, each of which varies by 0.3 to 0.8 of its mean.
     np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.03)
     np.testing.assert_allclose(found.mean(), expected.mean(), rtol=4e-3)
-    wanted = 4000 if SCALAR else 30_000
-    white = np.ones(3) if around.filters is None else around.filters.white
-    gain = wanted / (expected * white).sum() * 3
+    light = expected * (1 if around.filters is None else around.filters.white)
+    gain = (4000 if SCALAR else 30_000) / light.sum() * 3
     photons, _ = thinned(around, film(), gain)
-    assert abs(surprise(photons, expected * white, film(), gain)) < 5
+    assert abs(surprise(photons, light, film(), gain)) < 5
 
 
 def sunny(height: int = 32) -> np.ndarray:

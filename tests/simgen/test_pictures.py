@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run_simgen
 from PIL import Image
 
-from pcii.base import command_line
 from pcii.store import open_dataset, save_dataset
 from pcii.types import CameraGrid, PhotonCounts, Truth, Views
-from simgen.app import commands as cli
 from simgen.app.pictures import draw_sheet
 
 
@@ -32,15 +31,14 @@ def grid(**changes: Any) -> CameraGrid:
 @pytest.mark.renders
 def test_a_preview_and_a_sheet_show_something(nested_dataset: Path, tmp_path: Path) -> None:
     look, sheet = tmp_path / "look.jpg", tmp_path / "sheet.png"
-    title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
-    command = ["preview", "small", "-o", str(look), "--samples-per-pixel", "1", *title]
-    assert command_line.run(cli.app, command) == 0
-    assert command_line.run(cli.app, ["sheet", str(nested_dataset), "-o", str(sheet)]) == 0
+    title = r"title=between 5 $ and \6 $"  # no formula
+    assert run_simgen("preview", "small", "-o", look, "--samples-per-pixel", 1, "--set", title) == 0
+    assert run_simgen("sheet", nested_dataset, "-o", sheet) == 0
     assert_shows_something(look)
     assert_shows_something(sheet)
     counts = PhotonCounts.from_dense(np.ones(grid().shape_KLHW, dtype=int), grid())
     save_dataset(tmp_path / "bare", counts, z_mm=[540], title=r"5 $ and \6 $")  # neither truth nor radiance
-    assert command_line.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(tmp_path / "x.png")]) == 0
+    assert run_simgen("sheet", tmp_path / "bare", "-o", tmp_path / "x.png") == 0
 
 
 @pytest.mark.parametrize("shape", [(1, 12, 32, 32), (2, 3, 12, 200)])
@@ -75,10 +73,10 @@ def test_pictures_are_refused_in_one_sentence(
     name: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for command in (["preview", "two_objects"], ["sheet", str(tmp_path)]):
-        assert command_line.run(cli.app, [*command, "-o", str(tmp_path / name)]) == 2
+        assert run_simgen(*command, "-o", tmp_path / name) == 2
         sentence = capsys.readouterr().err
         assert words in sentence
         assert sentence.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
-    assert command_line.run(cli.app, ["sheet", str(tmp_path), "-o", str(tmp_path / "x.png")]) == 2
+    assert run_simgen("sheet", tmp_path, "-o", tmp_path / "x.png") == 2
     assert "not a finished dataset" in capsys.readouterr().err

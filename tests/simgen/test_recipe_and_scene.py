@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_runs import run_simgen
 from pydantic import BaseModel
 
-from pcii.base import InputError, command_line
-from simgen.app import commands
+from pcii.base import InputError
 from simgen.base import validate
 from simgen.spec import Analysis, Recipe, Scene, load_recipe
 
@@ -135,7 +135,7 @@ def test_a_wrong_scene_is_refused_in_one_sentence(values: dict, message: str) ->
 def test_a_command_prints_each_fault_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recipe = tmp_path / "r.toml"
     recipe.write_text('scene = "two_objects"\nseed = -1\n[photons]\nbudgt = 3\n')
-    assert command_line.run(commands.app, ["check", str(recipe)]) == 2
+    assert run_simgen("check", recipe) == 2
     lines = capsys.readouterr().err.splitlines()
     assert lines[0].startswith(f"error: {recipe}: unknown key 'photons.budgt'; did you mean 'budget'?")
     assert lines[1:] == ["  'seed': input should be greater than or equal to 0, got -1"]

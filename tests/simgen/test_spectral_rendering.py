@@ -11,30 +11,19 @@ from pcii.types import colour_index
 from simgen.dataset import capture_of
 from simgen.renderer import RenderScene, render_view
 from simgen.spec import Recipe
-from simgen.spectral import patch_names
-from simgen.spectral.spectra import colour_science
+from simgen.spectral import colour_science, patch_names
 
-pytestmark = [
-    pytest.mark.renders,
-    # colour-science says that it interpolates.
-    pytest.mark.filterwarnings("ignore:Aligning"),
-]
+# colour-science says that it interpolates.
+pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
-LUX, PIXEL_MM, F_NUMBER = 500.0, 0.25, 4.0
-ACROSS, DOWN = 6, 4
-SIDE_PX = 12
+LUX, PIXEL_MM, F_NUMBER, TIME_S = 500.0, 0.25, 4.0, 2e-7
+ACROSS, DOWN, SIDE_PX = 6, 4, 12
 FILM = {"rows": 1, "cols": 1, "height": DOWN * SIDE_PX, "width": ACROSS * SIDE_PX, "pixel_mm": PIXEL_MM}
 
 
 def recipe(camera: str | None) -> Recipe:
-    values = {
-        "scene": "chart",
-        "grid": FILM,
-        "sensor": {"camera": camera},
-        "photons": {"scope": "exposure"},
-        "exposure": {"f_number": F_NUMBER, "time_s": 2e-7},
-    }
-    return Recipe.model_validate(values)
+    values = {"scene": "chart", "grid": FILM, "sensor": {"camera": camera}, "photons": {"scope": "exposure"}}
+    return Recipe.model_validate(values | {"exposure": {"f_number": F_NUMBER, "time_s": TIME_S}})
 
 
 def chart(lamp: str, camera: str | None) -> tuple[RenderScene, Recipe]:
@@ -63,9 +52,8 @@ def integrated(camera: str, lamp: str) -> np.ndarray:
     curves = curves.copy().align(shape, extrapolator_kwargs={"method": "Constant", "left": 0, "right": 0})
     chart = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"].values()
     light = colour.SDS_ILLUMINANTS[lamp].copy().align(shape)
-    return np.array(
-        [colour.sd_to_XYZ(one, cmfs=curves, illuminant=light, method="Integration") for one in chart]
-    )
+    options = {"cmfs": curves, "illuminant": light, "method": "Integration"}
+    return np.array([colour.sd_to_XYZ(one, **options) for one in chart])
 
 
 @pytest.mark.parametrize(("camera", "lamp"), list(zip(CAMERAS, ("D65", "A"), strict=True)))
@@ -85,17 +73,14 @@ def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera
 
 def test_thinned_photons_of_the_chart_are_those_of_spectral_integration() -> None:
     built, made = chart("FL2", CAMERAS[0])
-    grid, gain = made.grid.camera_grid(), capture_of(made, built, made.seed).photons_per_radiance
-    assert gain is not None
+    grid, whole = made.grid.camera_grid(), capture_of(made, built, made.seed).photons_per_radiance or 0
     # A few hundred photons a patch one by one, or some thousand where that is cheap.
-    gain *= 0.05 if SCALAR else 0.5
+    gain = whole * (0.05 if SCALAR else 0.5)
     counts = counted(thinned(built, grid, gain, seed=2)[0], grid)[0, 0]
     colours = colour_index(grid.height, grid.width, made.cfa)
-    means = np.stack(
-        [by_patch((counts * (colours == colour))[..., None])[:, 0] for colour in range(3)], axis=1
-    )
-    inner = (SIDE_PX - 4) ** 2
-    found, expected = means * inner, integrated(CAMERAS[0], "FL2") * np.array([0.25, 0.5, 0.25])
+    of_colours = np.stack([counts * (colours == colour) for colour in range(3)], axis=-1)
+    found = by_patch(of_colours) * (SIDE_PX - 4) ** 2
+    expected = integrated(CAMERAS[0], "FL2") * np.array([0.25, 0.5, 0.25])
     expected *= found.sum() / expected.sum()
     # Chi-square of 72 Poisson numbers, one of them given away for the sum; 5 deviations of it.
     surprise = ((found - expected) ** 2 / expected).sum()
@@ -110,13 +95,10 @@ def test_thinned_photons_of_the_chart_are_those_of_spectral_integration() -> Non
 def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     """At 500 lux: E rho / pi cd/m^2, pi / (4 N^2) of it on the sensor, times area, time and photons."""
     built, made = chart("D65", camera)
-    grid, exposure = made.grid.camera_grid(), made.exposure
-    assert exposure is not None
-    gain = capture_of(made, built, made.seed).photons_per_radiance
-    assert gain is not None
-    view = render_view(built, grid, 0, 0, samples_per_pixel=256, seed=6).astype(np.float64)
-    seen = by_patch(view)[21] * gain  # neutral 5
-    per_lux = np.pi / (4 * F_NUMBER**2) * (PIXEL_MM * 1e-3) ** 2 * exposure.time_s / np.pi
+    gain: Any = capture_of(made, built, made.seed).photons_per_radiance
+    view = render_view(built, made.grid.camera_grid(), 0, 0, samples_per_pixel=256, seed=6)
+    seen = by_patch(view.astype(np.float64))[21] * gain  # neutral 5
+    per_lux = np.pi / (4 * F_NUMBER**2) * (PIXEL_MM * 1e-3) ** 2 * TIME_S / np.pi
     np.testing.assert_allclose(seen, photons_of_grey(camera) * per_lux * LUX, rtol=5e-3)
 
 

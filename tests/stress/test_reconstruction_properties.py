@@ -1,5 +1,7 @@
 """Properties of sections, photons, light and masks, for any numbers: see also every other `@given`."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from camera_grids import grids
@@ -28,12 +30,11 @@ def film_of(grid: pcii.CameraGrid, seed: int) -> np.ndarray:
 @given(nst.arrays(np.float64, (2, 3, 4, 5, 1), elements=st.floats(width=64)), DEPTHS)
 def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: float) -> None:
     try:
-        sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, variance=True)
+        sections: Any = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, variance=True)
     except pcii.InputError as fault:
         assert str(fault).startswith("radiance: ")  # noqa: PT017
         assert not np.isfinite(light).all() or np.abs(light).max() > 1e150  # its square is too large
         return
-    assert sections.variance is not None
     assert np.isfinite(sections.estimate).all()
     assert np.isfinite(sections.variance).all()
     assert (sections.variance >= 0).all()
@@ -82,11 +83,9 @@ SHARES = st.floats(0, 1)
 def test_a_scene_s_budget_is_shared_out_to_the_last_photon(seed, budget, views, power) -> None:
     energies = np.random.default_rng(seed).uniform(0, 1, (views, 1)) * 10.0**power
     photons = Photons(budget=budget, scope="scene", statistics="multinomial")
-    totals = fixed_totals(photons, energies, np.random.default_rng(seed))
-    assert totals is not None
+    totals: Any = fixed_totals(photons, energies, np.random.default_rng(seed))
     assert totals.sum() == budget
-    none = fixed_totals(photons, 0 * energies, np.random.default_rng(seed))
-    assert none is not None
+    none: Any = fixed_totals(photons, 0 * energies, np.random.default_rng(seed))
     assert not none.any()
 
 

@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from command_runs import run_pcii as run
 
 from pcii.app import Outcome, write_report
-from pcii.app.commands import app
-from pcii.base import command_line
 from pcii.metrics import score
 from pcii.sections import depth_range_of, reconstruct
 from pcii.store import save_dataset, verify
@@ -36,10 +35,8 @@ def outcome_of(root: Path, images: Any, truth: Truth | None, z_mm: tuple[float, 
     """Results as `analyse` gives them, of a method that keeps the first object, with a depth by hand."""
     dataset = save_dataset(root, images, truth, z_mm=list(z_mm), title="By hand")
     sections = reconstruct(dataset.counts_or_views, z_mm)
-    focus: tuple[Segmented, ...] = ()
-    if dataset.has_counts:
-        kept = np.repeat((IDS == 3)[None], len(z_mm), axis=0)
-        focus = (Segmented(kept, "by hand", sections),)
+    kept = Segmented(np.repeat((IDS == 3)[None], len(z_mm), axis=0), "by hand", sections)
+    focus = (kept,) if dataset.has_counts else ()
     depth = DepthMap(FOUND, np.where(np.isfinite(FOUND), 0.75, 0.0))
     result = score(focus, depth, truth, grid=dataset.grid, dataset=dataset.name)
     full_light = None if dataset.views is None else reconstruct(dataset.views, z_mm)
@@ -98,12 +95,12 @@ def test_without_truth_or_counts_nothing_of_them_is_shown(reports: dict[str, Wri
 def test_what_is_shown_has_the_truth_beside(reports: dict[str, Written], tmp_path: Path) -> None:
     full, page = reports["full"].outcome, reports["full"].page
     words = words_of(page)
-    for shown in (
+    of_truth = (
         "truth: objects at 500 mm",
         "by hand, 500 mm, compared with the truth",
         "true depth of the objects",
-        "estimated less true depth",
-    ):
+    )
+    for shown in (*of_truth, "estimated less true depth"):
         assert shown in words, shown
     assert page.count('class="bar"') == 4
     assert f"ball {full.score.objects[0]['entropy']['500']:.3f}" in words
@@ -182,15 +179,13 @@ def test_the_slider_moves_and_nothing_is_fetched_logged_or_cut_off(
     assert all(images == [text] and text == spoken for images, text, spoken in seen["states"])
 
 
-def run(*arguments: object) -> int:
-    return command_line.run(app, [str(argument) for argument in arguments])
+FAST = ["--method", "brightness", "--depth-method", "variance-sweep"]
 
 
 def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys) -> None:
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
     dataset = save_dataset(tmp_path / "d", COUNTS, z_mm=[500, 700], **texts)
-    fast = ["--method", "brightness", "--depth-method", "variance-sweep"]
-    assert run("run", tmp_path / "d", "-o", tmp_path / "out", *fast) == 0
+    assert run("run", tmp_path / "d", "-o", tmp_path / "out", *FAST) == 0
     page = (tmp_path / "out" / "report.html").read_text()
     for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16]):
         assert text in page
@@ -226,8 +221,7 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert "or a range with --z-range-mm" in capsys.readouterr().err
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 450, 700) == 0
     assert "depth.png: 450 mm is yellow, 700 mm violet" in capsys.readouterr().out
-    fast = ["--method", "brightness", "--depth-method", "variance-sweep"]
-    found = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, *fast]
+    found = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, *FAST]
     assert run(*found) == 2
     assert "no depth is found in the range; name depths with --z-mm" in capsys.readouterr().err
     texture = np.random.default_rng(2).gamma(0.5, 40, (40, 48))  # 2 px from view to view are 500 mm
@@ -237,7 +231,6 @@ def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsy
     assert run("run", tmp_path / "wall", "-o", tmp_path / "seen", *found[4:-2]) == 0
     (depths,) = re.findall(r"the depth map has most surfaces at ([\d., ]+) mm;", capsys.readouterr().out)
     assert min(abs(float(text) - 500) for text in depths.split(",")) < 30
-    command = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, "--z-mm", 600]
-    assert run(*command, *fast) == 0
+    assert run(*found, "--z-mm", 600) == 0
     assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 700, 400) == 2
     assert "near must be less than far" in capsys.readouterr().err

@@ -141,15 +141,15 @@ def test_a_range_that_is_not_near_to_far_is_refused(bad: Any) -> None:
 @pytest.mark.parametrize(("rows", "cols"), [(1, 9), (9, 1)])
 def test_a_line_of_cameras_has_depths_of_shaded_things_and_none_of_shaded_light(rows: int, cols: int) -> None:
     """Edges along the line are as sharp out of focus, and so is shading."""
-    grid = unit_grid(rows, cols, 192, 192)
+    grid = unit_grid(rows, cols, 128, 128)
     y, x = np.mgrid[-1:1:64j, -1:1:64j]
     disc = (1 - x**2 - y**2).clip(min=0)[..., None] * np.ones(3)
-    rates = opaque_views([(disc, 64, 64, 4)], grid) + 0.002
+    rates = opaque_views([(disc, 32, 32, 4)], grid) + 0.002
     rates *= 3 * 20000 * grid.view_count / rates.sum()  # a pixel sees one colour of three
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=1), grid, cfa="GRBG")
-    error_px = np.abs(8 / estimate_depth(counts, (1 / 6, 1 / 2)).z_mm[74:118, 74:118] - 8 * 4)
-    assert (error_px <= 3).mean() > 0.7  # .99 and .85; none where regions are compared by blur
-    shading = 1 + 0.5 * np.sin(np.arange(192) / 30)
+    error_px = np.abs(8 / estimate_depth(counts, (1 / 6, 1 / 2)).z_mm[42:86, 42:86] - 8 * 4)
+    assert (error_px <= 3).mean() > 0.7  # .77 and .99; none where regions are compared by blur
+    shading = 1 + 0.5 * np.sin(np.arange(128) / 20)
     light = shading[:, None] * shading * np.ones(grid.shape_KLHW)
     film = PhotonCounts.from_dense(np.random.default_rng(1).poisson(light), grid, cfa="GRBG")
     assert np.isnan(estimate_depth(film, (1 / 6, 1 / 2)).z_mm).all()
@@ -174,7 +174,7 @@ def test_depths_that_are_too_many_or_seen_by_one_camera_are_refused():
 def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, monkeypatch) -> None:
     """The dark far from all photons is left out: bounded, as the depth map of the whole film says."""
     events, range_mm = two_squares.counts.events, (1 / 4, 1 / 2.4)
-    grid = unit_grid(7, 7, 640, 704)
+    grid = unit_grid(7, 7, 512, 512)
     place = events.k, events.l, events.i + 64, events.j + 64, events.n
     counts, sizes = PhotonCounts.from_events(*place, grid, cfa="GRBG"), list[tuple[int, ...]]()
 
@@ -184,7 +184,7 @@ def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, mo
 
     monkeypatch.setattr("pcii.depth.posterior_depth.run_network", noting)
     whole, part, edges = (PosteriorDepth(margin_blocks=n)(counts, range_mm) for n in (1000, 64, 0))
-    assert sizes == [(320, 352), (224, 224), (128, 128)]  # blocks of 2 px
+    assert sizes == [(256, 256), (224, 224), (128, 128)]  # blocks of 2 px
 
     def errors_px(found: DepthMap) -> np.ndarray:
         both = np.isfinite(found.z_mm) & np.isfinite(whole.z_mm)
@@ -241,10 +241,8 @@ def wall_views(grid: CameraGrid, disparity_px: tuple[float, float]) -> np.ndarra
     for k, l in np.ndindex(grid.rows, grid.cols):
         down = i + (k - (grid.rows - 1) / 2) * disparity_px[1]
         right = j + (l - (grid.cols - 1) / 2) * disparity_px[0]
-        waves = np.cos(
-            frequency * (np.cos(angle) * right[..., None] + np.sin(angle) * down[..., None]) + phase
-        )
-        views[k, l, ..., 0] = 1 + waves.mean(axis=-1) * 2
+        along = np.cos(angle) * right[..., None] + np.sin(angle) * down[..., None]
+        views[k, l, ..., 0] = 1 + 2 * np.cos(frequency * along + phase).mean(axis=-1)
     return np.maximum(views, 0.05)
 
 
@@ -266,25 +264,19 @@ def test_a_wall_is_found_where_it_is(method: str, kind: str, most_px: float) -> 
     # Neighbouring planes can be the same section, since shifts are whole pixels.
     assert (error_px < 2).mean() > 0.97
     assert ((depth.confidence > 0) == np.isfinite(depth.z_mm)).all()
+    # The fault: cameras in the wrong order. Their depth is another one, or there is none.
+    wrong = estimate_depth(data_of(kind, grid, seen[::-1, ::-1]), WALL_RANGE_MM, method=method)
+    assert not np.median(np.abs(6 / wrong.z_mm[inner] - 6 * TRUE_PX)) < most_px
 
 
 def test_depth_has_no_levels_that_whole_shifts_would_give() -> None:
     grid = unit_grid(6, 6, 64, 64)  # of an even number of cameras all are half a pixel off at once
     error_px = []
-    for disparity_px in np.arange(3.6, 5.6, 0.2):
+    for disparity_px in np.arange(3.6, 5.6, 0.4):
         depth = estimate_depth(Views(wall_views(grid, (disparity_px, disparity_px)), grid), WALL_RANGE_MM)
         error_px.append(np.nanmedian(5 / depth.z_mm[16:-16, 16:-16]) - 5 * disparity_px)
     # 0.6 px with shifts to the nearest pixel.
     assert np.sqrt(np.mean(np.square(error_px))) < 0.4
-
-
-@pytest.mark.parametrize(("method", "kind", "most_px"), METHODS)
-def test_cameras_in_the_wrong_order_do_not_pass(method: str, kind: str, most_px: float) -> None:
-    grid = unit_grid(5, 7, 64, 72)
-    seen = wall_views(grid, (TRUE_PX, TRUE_PX))[::-1, ::-1]
-    depth = estimate_depth(data_of(kind, grid, seen), WALL_RANGE_MM, method=method)
-    error_px = np.abs(6 / depth.z_mm[16:-16, 16:-16] - 6 * TRUE_PX)
-    assert not np.median(error_px) < most_px  # or it is not answered
 
 
 @pytest.mark.parametrize("method", ["sweep-17", "variance-sweep"])
@@ -327,12 +319,9 @@ def half_a_map(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
 
 
 def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = [
-        EntryPoint(name, f"{__name__}:{name}", "pcii.depth_methods") for name in ("halfway", "half_a_map")
-    ]
-    monkeypatch.setattr(
-        "importlib.metadata.entry_points", lambda group: [point for point in points if point.group == group]
-    )
+    group, names = "pcii.depth_methods", ("halfway", "half_a_map")
+    points = {group: [EntryPoint(name, f"{__name__}:{name}", group) for name in names]}
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points.get(group, []))
     assert "halfway" in depth_methods(EVEN)
     assert (estimate_depth(EVEN, (0.5, 1.0), method="halfway").z_mm == 0.75).all()
     words = r"'half_a_map' of a package must return a pcii\.DepthMap of 8 x 8"

@@ -36,14 +36,8 @@ def random_inputs(Z: int = 5, h: int = 64, w: int = 96, seed: int = 0) -> Networ
         return rng.normal(size=shape).astype(np.float32)
 
     cells = Z, h // 2, w // 2
-    return NetworkInputs(
-        normal(Z, h, w),
-        abs(normal(Z, h, w)),
-        np.ones(cells, np.float32),
-        normal(*cells),
-        np.ones(1, np.float32),
-        np.zeros((Z, 2), np.float32),
-    )
+    maps = normal(Z, h, w), abs(normal(Z, h, w)), np.ones(cells, np.float32), normal(*cells)
+    return NetworkInputs(*maps, np.ones(1, np.float32), np.zeros((Z, 2), np.float32))
 
 
 def test_it_gives_a_distribution_for_each_block() -> None:
@@ -122,10 +116,9 @@ def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() ->
 def test_a_posterior_that_does_not_cover_the_film_is_refused() -> None:
     planes = FocalPlanes.at_total_disparity(unit_grid(1, 3, 4, 5), [4.0, 5.0])
     nowhere = np.zeros((2, 2), np.float32)
+    two, none = nowhere[None].repeat(2, 0), nowhere[None][:0]
     with pytest.raises(ValueError, match=r"probability: expected real numbers \(2, 2, 3\), got"):
-        DepthPosterior(
-            planes, nowhere[None].repeat(2, 0), nowhere, 2, nowhere[None][:0], nowhere > 0, nowhere > 0
-        )
+        DepthPosterior(planes, two, nowhere, 2, none, nowhere > 0, nowhere > 0)
 
 
 PRIOR = SurfacePrior(fall=0.3, jump=0.15)
@@ -212,10 +205,8 @@ def draw(photons_per_px: float, seed: int, shown: np.ndarray) -> PhotonCounts:
     wide = np.pad(shown, MARGIN)
     rate = np.empty(grid.shape_KLHW)
     for k, l in np.ndindex(CAMERAS, CAMERAS):
-        near, far = (
-            tuple(slice(MARGIN + step * (n - 2), MARGIN + step * (n - 2) + SIDE) for n in (k, l))
-            for step in (NEAR_STEP, FAR_STEP)
-        )
+        corners = (MARGIN + step * (np.array([k, l]) - 2) for step in (NEAR_STEP, FAR_STEP))
+        near, far = (np.s_[row : row + SIDE, col : col + SIDE] for row, col in corners)
         rate[k, l] = np.where(wide[near], bar[near], wall[far])
     return PhotonCounts.from_dense(random.poisson(photons_per_px * rate), grid)
 
@@ -277,9 +268,8 @@ def test_a_posterior_follows_its_sheets_where_photons_tell_the_depth(supported: 
     planes_px = np.arange(2.0, 26.0)
     far, near = (np.abs(planes_px - 4 * step) < 1.5 for step in (FAR_STEP, NEAR_STEP))
     one = (0.2 * far + 0.1 * near).astype(np.float32)  # and .1 of no surface
-    posterior = posterior_of(
-        np.tile(one[:, None, None], (1, SIDE, SIDE)), planes_px, requested=2, supported=supported
-    )
+    probability = np.tile(one[:, None, None], (1, SIDE, SIDE))
+    posterior = posterior_of(probability, planes_px, requested=2, supported=supported)
     sheets = sheets_of(bars())
     before = np.stack([np.full((SIDE, SIDE), share, np.float32) for share in (0.3, 0.6)])
     same = posterior_after(posterior, sheets, before, before, 0.02)

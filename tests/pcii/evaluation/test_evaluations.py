@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from command_runs import run_pcii
 from stored_datasets import rewrite_manifest
 from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
-from pcii.app import commands as cli
-from pcii.base import Executor, InputError, command_line
+from pcii.base import Executor, InputError
 from pcii.evaluation import Evaluation, evaluate, find_datasets, read_frame, read_rows
 from pcii.removal import METHODS
 from pcii.store import ROWS, TRUTH, open_dataset, read_manifest, verify
@@ -277,9 +277,9 @@ def test_depths_are_given_where_the_recipe_names_none(
     for path in find_datasets([series]):
         rewrite_manifest(path, analysis={})
     command = ["evaluate", str(series), "-o", str(out), "--method", "by count"]
-    assert command_line.run(cli.app, command) == 2
+    assert run_pcii(*command) == 2
     assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
-    assert command_line.run(cli.app, [*command, "--z-mm", "1", "--z-mm", "2"]) == 0
+    assert run_pcii(*command, "--z-mm", "1", "--z-mm", "2") == 0
     assert "evaluation.html" in capsys.readouterr().out
     calls.clear()
     evaluation = evaluate([series], out, methods=["by count"], z_mm=[1, 2])

@@ -11,10 +11,10 @@ from zipfile import ZipFile
 import numpy as np
 import pandas as pd
 import pytest
+from command_runs import run_pcii
 
 import pcii
-from pcii.app.commands import app
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.evaluation import (
     SUBMISSION,
     BenchmarkHalf,
@@ -30,7 +30,7 @@ from pcii.store import EVALUATION_FOLDER, INDEX, ROWS, list_files, read_index, v
 
 pytestmark = pytest.mark.renders
 HALF = "development"
-DEPTH = "pair_photons_1/1000/depth.npz"
+DEPTH, MASKS = (f"pair_photons_1/1000/{name}.npz" for name in ("depth", "masks"))
 SHAPE = (66, 70)
 Change = Callable[[Path], object]
 
@@ -47,6 +47,11 @@ def edit(name: str, old: str, new: str, *, lists: bool = True) -> Change:
     return change
 
 
+def link(name: str) -> Change:
+    """Puts a link to the file outside the folder in its place."""
+    return lambda folder: (folder / name).symlink_to((folder / name).rename(folder.parent / "x"))
+
+
 def depth(z_mm: object) -> Change:
     """Another depth map: of one value."""
     return lambda folder: np.savez(folder / DEPTH, z_mm=np.full(SHAPE, z_mm))
@@ -54,45 +59,36 @@ def depth(z_mm: object) -> Change:
 
 NUMBERS = r"expected numbers z_mm \(66, 70\), confidence \(66, 70\), of which z_mm is needed"
 # What is done to a good submission, and what is said of it.
-FAULTS: dict[str, tuple[Change, str]] = {
-    "another benchmark": (
-        edit(SUBMISSION, "small", "large", lists=False),
-        "benchmark: is 'large', but .* 'small'",
-    ),
-    "a dataset that is not there": (
+FAULTS: list[tuple[Change, str]] = [
+    (edit(SUBMISSION, "small", "large", lists=False), "benchmark: is 'large', but .* 'small'"),
+    (
         lambda f: shutil.copytree(f / "pair_photons_1", f / "pear_photons_1"),
         "pear_photons_1/.*: is no result of this half, .* files DATASET/LIGHT/depth.npz or masks.npz",
     ),
-    "missing pieces": (
+    (
         lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
         r"pair_photons_2/1000/\w+.npz: is missing, and of this light it is needed of all datasets$",
     ),
-    "masks of shares": (
-        lambda f: np.savez(f / DEPTH.replace("depth", "masks"), in_focus=np.full((2, *SHAPE), 0.5)),
-        "in_focus: expected 0 and 1",
-    ),
-    "another size": (lambda f: np.savez(f / DEPTH, z_mm=np.ones((66, 7))), NUMBERS),
-    "objects": (depth(None), "depth.npz: damaged, or no .npz file of numbers as numpy.savez writes it$"),
-    "no array": (lambda f: ZipFile(f / DEPTH, "w").writestr("z_mm", "1"), NUMBERS),
-    "below 0": (depth(-1.0), "z_mm: expected 0.001 to 1e.12 mm"),
-    "half a file": (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: damaged, or no .npz file of numbers"),
-    "elsewhere": (
-        lambda f: (f / DEPTH).symlink_to((f / DEPTH).rename(f.parent / "x")),
+    (lambda f: np.savez(f / MASKS, in_focus=np.full((2, *SHAPE), 0.5)), "in_focus: expected 0 and 1"),
+    (lambda f: np.savez(f / DEPTH, z_mm=np.ones((66, 7))), NUMBERS),
+    (depth(None), "depth.npz: damaged, or no .npz file of numbers as numpy.savez writes it$"),
+    (lambda f: ZipFile(f / DEPTH, "w").writestr("z_mm", "1"), NUMBERS),
+    (depth(-1.0), "z_mm: expected 0.001 to 1e.12 mm"),
+    (lambda f: os.truncate(f / DEPTH, 999), "depth.npz: damaged, or no .npz file of numbers"),
+    (
+        link(DEPTH),
         "depth.npz: is no result of this half, or a link out of the folder; expected files DATASET",
     ),
-}
+]
 # What is done to scores of which a page is made, and what is said of it.
-CHANGES: dict[str, tuple[Change, str]] = {
-    "a row": (edit(ROWS, '"iou": 0', '"iou": 1', lists=False), f"{ROWS}.*; .* make or score it again"),
-    "no list": (lambda f: (f / "evaluation.json").unlink(), "theirs: not a finished evaluation"),
-    "text": (edit(ROWS, '"iou": [0-9.]+', '"iou": "0.5"'), "line 1: planes.0.scores.iou: .* a valid number"),
-    "a column's name": (edit(ROWS, '"iou"', '"method"'), "line 1: planes.0.scores: 'method' is no name"),
-    "no scores": (edit(ROWS, '"planes"', '"other"'), "line 1: is no row of scores"),
-    "a link": (
-        lambda f: (f / ROWS).symlink_to((f / ROWS).rename(f.parent / "x")),
-        f"{ROWS}: is a link; a folder of scores holds its files themselves",
-    ),
-}
+CHANGES: list[tuple[Change, str]] = [
+    (edit(ROWS, '"iou": 0', '"iou": 1', lists=False), f"{ROWS}.*; .* make or score it again"),
+    (lambda f: (f / "evaluation.json").unlink(), "theirs: not a finished evaluation"),
+    (edit(ROWS, '"iou": [0-9.]+', '"iou": "0.5"'), "line 1: planes.0.scores.iou: .* a valid number"),
+    (edit(ROWS, '"iou"', '"method"'), "line 1: planes.0.scores: 'method' is no name"),
+    (edit(ROWS, '"planes"', '"other"'), "line 1: is no row of scores"),
+    (link(ROWS), f"{ROWS}: is a link; a folder of scores holds its files themselves"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -164,18 +160,18 @@ def test_functions_of_ones_own_are_run_each_into_a_folder_of_its_own(
     methods = ("a_method_of_mine.py:everything", "depth:a_method_of_mine:near")
     for method, out in zip(methods, ("masks", "depth"), strict=True):
         command = ["benchmark", "run", method, *options, "--budget", "30"]
-        assert command_line.run(app, [*command, "-o", f"submissions/{out}"]) == 0
+        assert run_pcii(*command, "-o", f"submissions/{out}") == 0
     # The commands that the page prints, with the folder of the benchmark, find the rows and measure nothing.
-    assert command_line.run(app, ["benchmark", "page", "submissions", "-o", "page.html"]) == 0
+    assert run_pcii("benchmark", "page", "submissions", "-o", "page.html") == 0
     commands = re.findall("pcii (benchmark run .*?)</td>", (tmp_path / "page.html").read_text())
     assert [command.split()[2] for command in commands] == [methods[1], methods[0]]
     rows = tmp_path / commands[0].split()[-1] / "rows.jsonl"
     before = rows.stat().st_size
     repeated = commands[0].replace("BENCHMARK", str(small_benchmark)).split()
-    assert command_line.run(app, [*repeated, "--budget", "30"]) == 0
+    assert run_pcii(*repeated, "--budget", "30") == 0
     assert rows.stat().st_size == before
     absent = ["benchmark", "run", methods[0], *options, "--budget", "77", "-o", "other"]
-    assert command_line.run(app, absent) == 2
+    assert run_pcii(*absent) == 2
     assert "no dataset of the development half that" in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
 
@@ -186,7 +182,7 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     about = {"authors": "B. C.", "url": None, "trained_on": "drawn scenes"}
     run_method("depth:sweep-17", data, folder / "ours", **about)
     edit(SUBMISSION, r'"command_name": "[^"]*', '"command_name": "net:a; b')(folder / "ours")
-    assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
+    assert run_pcii("benchmark", "page", folder, "-o", out) == 0
     text = out.read_text()
     assert "small: methods compared" in text
     for words in ("mine", "depth:mine", "depth:sweep-17", "B. C.", "drawn scenes"):
@@ -198,19 +194,19 @@ def test_one_page_has_all_submissions(data: BenchmarkHalf, scored: Evaluation, t
     assert out.read_text() == text
 
 
-@pytest.mark.parametrize(("make", "says"), CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize(("make", "says"), CHANGES)
 def test_no_page_is_made_of_scores_that_were_changed(
     make: Change, says: str, scored: Evaluation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, out = tmp_path / "submissions" / "theirs", tmp_path / "page.html"
     shutil.copytree(scored.folder, folder)
     make(folder)
-    assert command_line.run(app, ["benchmark", "page", str(folder.parent), "-o", str(out)]) == 2
+    assert run_pcii("benchmark", "page", folder.parent, "-o", out) == 2
     assert re.fullmatch(f"error: .*{says}.*\n", capsys.readouterr().err)
     assert not out.exists()
 
 
-@pytest.mark.parametrize(("make", "says"), FAULTS.values(), ids=FAULTS)
+@pytest.mark.parametrize(("make", "says"), FAULTS)
 def test_submissions_with_faults_are_answered_in_a_sentence(
     make: Change, says: str, data: BenchmarkHalf, submitted: Path, tmp_path: Path
 ) -> None:
@@ -228,7 +224,7 @@ def test_an_unfinished_benchmark_names_the_command_that_goes_on(
     part = shutil.copytree(small_benchmark, tmp_path / "part")
     write_index(part, [row for row in read_index(part) if "photons" not in row["path"]])
     command = ["benchmark", "run", "brightness", "--data", str(part), "-o", str(tmp_path / "out")]
-    assert command_line.run(app, [*command, "--half", HALF]) == 0
+    assert run_pcii(*command, "--half", HALF) == 0
     printed = capsys.readouterr().out
     assert f"{part}: 3 of 5 datasets of the {HALF} half are missing" in printed
     assert f"`simgen benchmark make -o {part}` goes on with it" in printed

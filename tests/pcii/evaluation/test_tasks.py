@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import html
+import json
 import sys
 from collections.abc import Sequence
 from importlib.metadata import packages_distributions, version
@@ -11,16 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run_pcii
 from other_packages import install_package
 from tiny_datasets import NESTED, OWN, write_dataset
 
 import pcii
-from pcii.app import commands as cli
 from pcii.app import load_estimates
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.depth import estimate_depth
 from pcii.evaluation import NamedMethod, evaluate, named_methods, read_rows, software_of, tasks_of
-from pcii.evaluation.rows import writing_rows
 from pcii.metrics import object_bounds
 from pcii.removal import removal_methods
 from pcii.sections import reconstruct
@@ -71,7 +71,7 @@ def test_full_light_is_a_budget_by_name_and_depth_means_the_default(tmp_path: Pa
     both, out = saved(tmp_path / "both", (COUNTS, LIGHT)), tmp_path / "out"
     methods = ("depth", "depth:posterior", "depth:variance-sweep")
     command = ["evaluate", str(both.path), "-o", str(out), *(f"--method={method}" for method in methods)]
-    assert command_line.run(cli.app, [*command, "--budget", FULL_LIGHT]) == 0
+    assert run_pcii(*command, "--budget", FULL_LIGHT) == 0
     rows = {(row["budget"], row["method"]) for row in read_rows(out)}
     assert rows == {(FULL_LIGHT, method) for method in methods[1:]}
     frame = evaluate([both.path], out, methods=["depth"]).frame
@@ -86,7 +86,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(tmp_
     for number, (command, option) in enumerate([("depth", "--method"), ("run", "--depth-method")]):
         out = tmp_path / str(number)
         arguments = [command, *at_light, option, "structure-tensor", "-o", str(out)]
-        assert command_line.run(cli.app, arguments) == 0
+        assert run_pcii(*arguments) == 0
         _, depth = load_estimates(out, both.at_light(Light.parse(FULL_LIGHT)))
         assert depth is not None
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
@@ -161,7 +161,8 @@ def test_every_package_that_computes_is_recorded() -> None:
                 elif isinstance(node, ast.ImportFrom) and node.module:
                     imported.add(node.module)
     roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
-    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
+    distributions = packages_distributions()
+    packages = {name for root in roots for name in distributions.get(root, [root])}
     assert packages - DRAWS_TALKS_OR_LOADS <= set(own_software())
 
 
@@ -200,9 +201,10 @@ def test_the_page_says_what_made_it(tmp_path: Path) -> None:
     evaluate([data], out, methods=["brightness", "shape-from-focus"])
     rows = read_rows(out)
     earlier = tmp_path / "earlier"
-    with writing_rows(earlier) as file:
-        file.add(rows[0] | {"date": "2026-01-10", "software": {"numpy": "1.0"}})
-        file.add({name: value for name, value in rows[1].items() if name != "software"})
+    earlier.mkdir()
+    unknown = {name: value for name, value in rows[1].items() if name != "software"}
+    both = rows[0] | {"date": "2026-01-10", "software": {"numpy": "1.0"}}, unknown
+    (earlier / "rows.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in both))
     (sentence,) = evaluate([data], earlier, methods=["shape-from-focus"]).made_again
     assert sentence == "1 scores of shape-from-focus, since what makes them is not known"
     page = html.unescape((earlier / "evaluation.html").read_text())

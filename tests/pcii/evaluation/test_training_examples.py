@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 import pcii
-from pcii import CameraGrid, Collection, Dataset, InputError, PhotonCounts, Truth
+from pcii import Collection, Dataset, InputError, PhotonCounts, Truth
 from pcii.types import colour_index
 
-GRID = CameraGrid(
-    rows=3, cols=4, pitch_mm=(4.64, 5.6), focal_mm=50.0, pixel_mm=0.4, height=24, width=32, shear_px=(1, 2)
-)
+OPTICS = pcii.Optics(pitch_mm=(4.64, 5.6), focal_mm=50.0, pixel_mm=0.4, shear_px=(1, 2))
+GRID = OPTICS.grid((3, 4, 24, 32))
 Z_MM = (100.0, 200.0)
 BUDGET = 3000.0
 

@@ -24,10 +24,8 @@ def test_noise_has_none_on_average(cfa: str | None, rate: float, octaves: int) -
     grid = unit_grid(4, 4, 256, 256)
     # Where texture would stand far above the noise a coefficient has (y^2 / v - 1) / 2, of variance 1 / 2.
     model = TextureModel(contrast=1e3, averaging_error=0.0, saturation_nats=1e12, octaves=octaves)
-    nats = evidence_of_texture(
-        even_light(grid, rate, 3, cfa), FocalPlanes.at_depths(grid, [0.5]), model=model
-    ).nats
-    inner = nats[0, 16:-16, 16:-16]
+    counts, planes = even_light(grid, rate, 3, cfa), FocalPlanes.at_depths(grid, [0.5])
+    inner = evidence_of_texture(counts, planes, model=model).nats[0, 16:-16, 16:-16]
     # The first octaves have as many independent coefficients as blocks, the others fewer.
     deviation = np.sqrt(sum(4.0**-octave / 2 for octave in range(octaves)) / inner.size)
     assert abs(inner.mean()) < 4 * deviation
@@ -71,9 +69,8 @@ def test_two_octaves_are_those_of_the_equations() -> None:
 def test_films_of_any_size_have_as_many_octaves_as_are_asked_for(size: tuple[int, int], octaves: int) -> None:
     grid = unit_grid(2, 3, *size)
     planes = FocalPlanes.at_depths(grid, [0.5, 1.0])
-    nats = evidence_of_texture(
-        even_light(grid, 1.0, 0, None), planes, model=TextureModel(octaves=octaves)
-    ).nats
+    light, model = even_light(grid, 1.0, 0, None), TextureModel(octaves=octaves)
+    nats = evidence_of_texture(light, planes, model=model).nats
     assert nats.shape == (2, -(-size[0] // 2), -(-size[1] // 2))
     assert np.isfinite(nats).all()
 
@@ -224,9 +221,8 @@ def test_right_views_are_not_warned_about_and_their_depths_are_found(views) -> N
     """To 0.7 px of total disparity: planes are half a pixel apart, of views that move by whole ones."""
     fit = check_grid(Views(views, GRID), (30.0, 250.0))
     assert fit == CameraFit(fit.z_mm, fit.nearest_mm)
-    assert [2 * PARALLAX_PX / z for z in fit.z_mm] == pytest.approx(
-        [2 * PARALLAX_PX / z for z in (50, 80, 180)], abs=0.7
-    )
+    found, expected = ([2 * PARALLAX_PX / z for z in depths] for depths in (fit.z_mm, (50, 80, 180)))
+    assert found == pytest.approx(expected, abs=0.7)
 
 
 @pytest.mark.parametrize("mended_by", ORDERS[1:], ids=str)

@@ -1,4 +1,4 @@
-"""Small pictures whose numbers say of which view they are, and the command line within the tests."""
+"""Small pictures whose numbers say of which view they are, and imports that are refused."""
 
 import re
 from collections.abc import Sequence
@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
+from command_runs import run_pcii
 from PIL import Image
 from png_files import png16
 
 from pcii import Optics
-from pcii.app.commands import app
-from pcii.base import command_line
 
 OPTICS = Optics(pitch_mm=(2.0, 2.0), focal_mm=35.0, sensor_mm=36.0)
 H, W = 6, 8
@@ -60,16 +59,12 @@ def make_folder(
     return root
 
 
-def run(*arguments: object) -> int:
-    return command_line.run(app, [str(argument) for argument in arguments])
-
-
 def check_refused(
     source: Path, out: Path, options: Sequence[object], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """An import ends with exit code 2 and one sentence that has these words, and leaves nothing."""
     capsys.readouterr()
-    assert run("import", source, "-o", out, *options) == 2
+    assert run_pcii("import", source, "-o", out, *options) == 2
     *_, message = capsys.readouterr().err.strip().split("\n")
     assert message.startswith("error: ")
     assert re.search(words, message), message

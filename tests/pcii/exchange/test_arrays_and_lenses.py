@@ -10,7 +10,8 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, check_refused, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, H, W, check_refused, numbers, write
 from PIL import Image
 from png_files import chunk, compressed, png_file
 from rendered_cards import Card, render
@@ -59,26 +60,24 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
     factor = 0.025 * 100.0 * W
     disparity = (factor * 4.25 / depth_m - factor) / 4.25 / 35.0
     pfm(root / name, depth_m if "depth" in name else disparity, scale)
-    scene = pcii.import_hci(root, note=[].append)
+    scene: Any = pcii.import_hci(root, note=[].append)
     grid = scene.views.grid
     assert (grid.rows, grid.cols, grid.pitch_mm) == (3, 3, (25.0, 25.0))
-    assert scene.truth is not None
     np.testing.assert_allclose(scene.truth.z_mm, 1000 * depth_m, rtol=1e-5)
     across, down = disparity_px(grid, 1000 * depth_m)  # the cameras see the disparities of the benchmark
-    np.testing.assert_allclose(across, disparity, atol=1e-6)
-    np.testing.assert_allclose(down, disparity, atol=1e-6)
+    np.testing.assert_allclose([across, down], [disparity, disparity], atol=1e-6)
     np.testing.assert_allclose(np.ravel(disparity_px(grid, 4250.0)), 0, atol=1e-12)
     assert scene.truth.names == {}
 
 
 def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
-    scene = pcii.import_hci(hci_folder(tmp_path / "scene"))
-    assert scene.z_range_mm is None  # 8 px are so coarse that -1.6 px would be beyond infinity
+    assert (
+        pcii.import_hci(hci_folder(tmp_path / "scene")).z_range_mm is None
+    )  # 8 px are so coarse that -1.6 px would be beyond infinity
     text = PARAMETERS.format(height=512, width=512, rows=1, cols=1)
     (tmp_path / "parameters.cfg").write_text(text)
     write(tmp_path / "input_Cam000.png", np.zeros((512, 512, 3), np.uint8))
-    scene = pcii.import_hci(tmp_path)
-    assert scene.z_range_mm is not None
+    scene: Any = pcii.import_hci(tmp_path)
     near, far = (float(disparity_px(scene.views.grid, z)[0]) for z in scene.z_range_mm)
     assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
 
@@ -200,11 +199,8 @@ def write_counts(folder: Path, kind: str) -> str:
         write_ome_set(folder)
         return "{row}_{col}.tif"
     # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
-    options: dict[str, dict[str, Any]] = {
-        "ImageJ": {"imagej": True, "truncate": True},
-        "shaped": {"truncate": True},
-    }
-    options |= {"appended": {"append": True}, ">u2": {"byteorder": ">"}}
+    options: dict[str, dict[str, Any]] = {"ImageJ": {"imagej": True, "truncate": True}}
+    options |= {"shaped": {"truncate": True}, "appended": {"append": True}, ">u2": {"byteorder": ">"}}
     for k, l in np.ndindex(2, 2):
         path, frames = folder / f"{k}_{l}.tif", COUNTS[k, l].astype("int16" if kind == "int16" else "uint16")
         for part in np.split(frames, 5) if kind == "appended" else [frames]:
@@ -258,10 +254,9 @@ def test_a_benchmark_folder_of_another_system(tmp_path: Path) -> None:
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 2.0), scale=-2.0)
     (root / "valid.png").write_bytes(b"")
     notes: list[str] = []
-    scene = pcii.import_hci(root, note=notes.append)
+    scene: Any = pcii.import_hci(root, note=notes.append)
     assert scene.views.grid.focal_mm == 100
     assert notes[1:] == ["not used: valid.png", "not used of parameters.cfg: authors"]
-    assert scene.truth is not None
     np.testing.assert_allclose(scene.truth.z_mm, 4000)
 
 
@@ -353,15 +348,11 @@ def write_depth(path: Path, z_mm: np.ndarray) -> None:
         OpenEXR.File({}, channels).write(str(path))
 
 
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("z.png", []),
-        ("z.exr", ["--depth-unit-mm", 1000]),
-        ("ray.npy", ["--depth-along-ray"]),
-        ("z.npz", ["--depth-key", "z"]),
-    ],
-)
+DEPTH_FILES = {"z.png": [], "z.exr": ["--depth-unit-mm", 1000], "ray.npy": ["--depth-along-ray"]}
+DEPTH_FILES |= {"z.npz": ["--depth-key", "z"]}
+
+
+@pytest.mark.parametrize(("name", "options"), DEPTH_FILES.items())
 def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options: list[Any]) -> None:
     grid = OPTICS.grid(VIEWS_KLHW.shape)
     z_mm = np.full((20, 24), 90.0, np.float32)
@@ -377,15 +368,10 @@ def test_true_depth_beside_views(tmp_path: Path, capsys: Any, name: str, options
     printed = capsys.readouterr().out
     assert f"with the true depth of the virtual centre, 45 to 90 mm, from {name}" in printed
     assert "24 of 480 pixels have no known depth there, and count in no score" in printed
-    dataset = pcii.open_dataset(tmp_path / "out")
-    truth = dataset.truth
-    assert truth is not None
-    assert dataset.views is not None
-    planes = pcii.FocalPlanes.at_depths(grid, [45, 90])
-    masks = pcii.TrueFocus(planes, truth).by_pixel
-    focus = pcii.Segmented(
-        masks, "by hand", pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
-    )
+    dataset: Any = pcii.open_dataset(tmp_path / "out")
+    truth, planes = dataset.truth, pcii.FocalPlanes.at_depths(grid, [45, 90])
+    sections = pcii.reconstruct(pcii.limit_photons(dataset.views, 100, seed=1), planes)
+    focus = pcii.Segmented(pcii.TrueFocus(planes, truth).by_pixel, "by hand", sections)
     by_object, by_pixel = (
         [row["precision"] for row in pcii.score(focus, None, truth).planes if row["truth"] == kind]
         for kind in ("object", "pixel")

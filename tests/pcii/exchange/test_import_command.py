@@ -3,13 +3,15 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, check_refused, make_folder, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, H, W, check_refused, make_folder, numbers, write
 from PIL import Image, ImageCms
 from rendered_cards import Card, render
 from test_arrays_and_lenses import hci_folder, pfm
@@ -41,12 +43,10 @@ def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
     printed = capsys.readouterr().out
     assert "3 x 3 views of 90 x 120 px, GRBG" in printed
     assert "warning" not in printed
-    dataset = open_dataset(out)
-    assert dataset.grid == GRID
-    assert dataset.cfa == "GRBG"
+    dataset: Any = open_dataset(out)
+    assert (dataset.grid, dataset.cfa) == (GRID, "GRBG")
     assert dataset.counts.total == pytest.approx(9 * 300, abs=4 * np.sqrt(2700))
     assert dataset.light.photons == 300
-    assert dataset.views is not None
     assert dataset.views.cfa == "GRBG"
     disparities = [467 / z for z in dataset.analysis["z_mm"]]  # in px, from the first camera to the last
     assert disparities == pytest.approx([467 / 60, 467 / 150], abs=0.75)
@@ -72,6 +72,7 @@ def test_surfaces_of_photon_counts_are_where_the_depth_map_has_them(tmp_path: Pa
 
 FIT = "warning: the views fit together far better "
 NOT_MIRRORED = ["--swap-axes", "--flip-cols"]
+OUTSIDE = "warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm"
 WRONG_PITCH = ["--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
 
 
@@ -80,11 +81,7 @@ WRONG_PITCH = ["--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
     [
         ("{row}_{col}.png", CAMERAS, f"{FIT}with --swap-axes;"),
         ("{col}_{row}.png", [*CAMERAS, *NOT_MIRRORED], f"{FIT}without --swap-axes --flip-cols;"),
-        (
-            "{col}_{row}.png",
-            WRONG_PITCH,
-            "warning: sharpest at .* mm, all outside of --z-range-mm; correct the range, --pitch-mm",
-        ),
+        ("{col}_{row}.png", WRONG_PITCH, OUTSIDE),
     ],
 )
 def test_the_option_that_mends_is_named(
@@ -102,8 +99,7 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         tifffile.imwrite(file, stack, photometric="rgb")
         assert run("import", file, "-o", tmp_path / name, *CAMERAS, *options) == 0
         assert "warning" not in capsys.readouterr().out
-        views = open_dataset(tmp_path / name).views
-        assert views is not None
+        views: Any = open_dataset(tmp_path / name).views
         np.testing.assert_allclose(views.view(1, 2), srgb_to_linear(stack[places.index((1, 2))]), rtol=1e-6)
 
 
@@ -126,8 +122,7 @@ def test_other_sources(tmp_path: Path, capsys) -> None:
     root = hci_folder(tmp_path / "hci")
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
     assert run("import", root, "-o", tmp_path / "a", "--photons", 50) == 0
-    dataset = open_dataset(tmp_path / "a")
-    assert dataset.truth is not None
+    dataset: Any = open_dataset(tmp_path / "a")
     np.testing.assert_allclose(dataset.truth.z_mm, 4000)
     assert dataset.grid.shear_px[0] > 0
     np.save(tmp_path / "frames.npy", np.ones((2, 3, 4, H, W), np.uint8))
@@ -142,8 +137,6 @@ def test_other_sources(tmp_path: Path, capsys) -> None:
     assert "too few views, pixels or photons to judge the cameras by" in capsys.readouterr().out
 
 
-# What is wrong: a folder, the options, and words of the one sentence
-
 Make = Callable[[Path], Any]
 
 
@@ -157,16 +150,24 @@ def folder(change: Make | None = None, **kinds: Any) -> Make:
     return make
 
 
+def without_a_view(root: Path) -> None:
+    (root / "1_1.png").unlink()
+
+
+def with_alpha(root: Path) -> None:
+    Image.new("RGBA", (W, H)).save(root / "0_0.png")
+
+
 def turned(root: Path) -> None:
     exif = Image.Exif()
     exif[0x0112] = 6
     Image.new("RGB", (W, H)).save(root / "0_0.png", "JPEG", exif=exif)
 
 
-def array(values: Any, name: str = "in.npy") -> Make:
+def array(shape: tuple[int, ...], dtype: Any = float) -> Make:
     def make(root: Path) -> Path:
-        np.save(root / name, values, allow_pickle=True)
-        return root / name
+        np.save(root / "in.npy", np.ones(shape, dtype))
+        return root / "in.npy"
 
     return make
 
@@ -176,64 +177,26 @@ def channels(root: Path) -> None:
     tifffile.imwrite(root / "0_0.tif", frames, imagej=True, metadata={"axes": "TCYX"})
 
 
-LIGHT = np.ones((2, 2, H, W))
-WRONG: list[tuple[str, Make, list[Any], str]] = [
-    ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
-    (
-        "one missing",
-        folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5),
-        NAMED,
-        "1 of 5 x 5 files missing, first row 1, col 1",
-    ),
-    (
-        "more views than there can be",
-        folder(),
-        ["--pattern", "{index}_0.png", *CAMERAS, "--grid", 10**20, 10**20],
-        "too far apart for a grid of at most 100000 views",
-    ),
-    (
-        "no view in a row",
-        folder(),
-        ["--pattern", "{index}_0.png", *CAMERAS, "--grid", -1, -3],
-        "views are not -1 x -3",
-    ),
-    ("lenses of a folder", folder(), ["--lens-array", 2, 2, *CAMERAS], "--lens-array is for one picture"),
-    (
-        "alpha",
-        folder(lambda r: Image.new("RGBA", (W, H)).save(r / "0_0.png")),
-        NAMED,
-        "0_0.png: has an alpha channel",
-    ),
-    ("turned JPEG", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
-    (
-        "axes of another order",
-        array(np.ones((9, H, W, 3))),
-        CAMERAS,
-        r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)",
-    ),
-    (
-        "channels as pages",
-        folder(channels, ending="tif"),
-        ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"],
-        "the axes TCYX, frames of several channels",
-    ),
-    ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
-    (
-        "counts and photons",
-        folder(channels=1),
-        [*NAMED, "--counts", "--photons", 9],
-        "--photons: is for pictures",
-    ),
-    (
-        "options of other sources",
-        folder(),
-        [*NAMED, "--frames", 0, 1, "--width", 3],
-        "--width, --frames: not for .*, which is read as pictures",
-    ),
+BY_INDEX = ["--pattern", "{index}_0.png", *CAMERAS, "--grid"]
+TIFF = ["--pattern", "{col}_{row}.tif", *CAMERAS]
+OF_CUBES = ["--frames", 0, 1, "--width", 3]
+WRONG: list[tuple[Make, list[Any], str]] = [
+    (folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
+    (folder(without_a_view, rows=5, cols=5), NAMED, "1 of 5 x 5 files missing, first row 1, col 1"),
+    (folder(), [*BY_INDEX, 10**20, 10**20], "too far apart for a grid of at most 100000 views"),
+    (folder(), [*BY_INDEX, -1, -3], "views are not -1 x -3"),
+    (folder(), ["--lens-array", 2, 2, *CAMERAS], "--lens-array is for one picture"),
+    (folder(with_alpha), NAMED, "0_0.png: has an alpha channel"),
+    (folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    (array((9, H, W, 3)), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
+    (folder(channels, ending="tif"), [*TIFF, "--counts"], "the axes TCYX, frames of several channels"),
+    (array((2, 2, H, W), np.uint8), CAMERAS, "may be sRGB of pictures or linear"),
+    (folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
+    (folder(), [*NAMED, *OF_CUBES], "--width, --frames: not for .*, which is read as pictures"),
 ]
 
 
-@pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
+@pytest.mark.parametrize(("make", "options", "words"), WRONG)
 def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
     check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)
 
@@ -249,14 +212,7 @@ def by_the_standard(share: float) -> float:
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize(
     ("ending", "dtype"),
-    [
-        ("png", "uint8"),
-        ("png", "uint16"),
-        ("tif", "uint8"),
-        ("tif", "uint16"),
-        ("tif", "float32"),
-        ("exr", "float32"),
-    ],
+    [*product(("png", "tif"), ("uint8", "uint16")), ("tif", "float32"), ("exr", "float32")],
 )
 def test_all_bits_of_every_format_arrive_and_opaque_alpha_is_left_out(
     tmp_path: Path, ending, dtype, channels
@@ -345,14 +301,11 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
     with pytest.warns(UserWarning, match=r"not used: 1 more pictures in 0_0\.jpg"):
         views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
     np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
-    spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
-    for name, profile in spaces:
-        content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes()
-        first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
-    linear = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes() + b"Linear sRGB"
-    first.save(tmp_path / "0_0.gimp.png", icc_profile=linear)
     notes: list[str] = []
-    for profile in ("srgb", "other", "gimp"):
+    spaces: list[tuple[Any, str, bytes]] = [("sRGB", "srgb", b""), ("LAB", "other", b"")]
+    for name, profile, more in [*spaces, ("sRGB", "gimp", b"Linear sRGB")]:
+        content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes() + more
+        first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
         import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, note=notes.append)
     named = [f"not used: the colour profile in 0_0.{profile}.png" for profile in ("other", "gimp")]
     assert [one for one in notes if "profile" in one] == named

@@ -2,18 +2,19 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from picture_folders import OPTICS, check_refused, run
+from command_runs import run_pcii as run
+from picture_folders import OPTICS, check_refused
 from stored_datasets import one_sentence
 from twins import unit_grid
 
 import pcii
 from pcii import CameraGrid, FrameFormat, ViewOrder, import_counts, open_dataset
-from pcii.exchange import count_arrays
 from pcii.types import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
@@ -61,8 +62,7 @@ def counts_of_bits(bits: np.ndarray, span: tuple[int, int]) -> PhotonCounts:
 def check_counts(counts: PhotonCounts, bits: np.ndarray) -> None:
     """Sums and the frame of every single count are those of the bits (K, L, T, H, W)."""
     np.testing.assert_array_equal(counts.dense, bits.sum(axis=2))
-    events = counts.frame_events
-    assert events is not None
+    events: Any = counts.frame_events
     listed = np.stack([events.k, events.l, events.i, events.j, events.frame], axis=1)
     np.testing.assert_array_equal(listed, np.argwhere(bits.transpose(0, 1, 3, 4, 2)))
 
@@ -73,8 +73,8 @@ def test_sums_do_not_depend_on_what_is_kept(monkeypatch, most_kept, piece_bytes,
     for shape, share in (((1, 1, 1), 1.0), ((2, 3, 5), 0.0), ((300, 2, 33), 0.5)):
         bits = np.random.default_rng(3).random((1, 1, *shape)) < share
         check_counts(counts_of_bits(bits, (0, shape[0])), bits)
-    monkeypatch.setattr(count_arrays, "MOST_KEPT", most_kept)
-    monkeypatch.setattr(count_arrays, "PIECE_BYTES", piece_bytes)
+    monkeypatch.setattr("pcii.exchange.count_arrays.MOST_KEPT", most_kept)
+    monkeypatch.setattr("pcii.exchange.count_arrays.PIECE_BYTES", piece_bytes)
     counts, seen = counts_of_bits(BITS, span), BITS[:, :, span[0] : span[1]]
     if seen.sum() <= most_kept:
         check_counts(counts, seen)
@@ -116,9 +116,8 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
 def test_packed_bits_that_are_read_as_counts_are_warned_of(share: float) -> None:
     rng, notes = np.random.default_rng(1), []
     import_counts(packed(rng.random((1, 2, 40, 16, 64)) < share), OPTICS, note=notes.append)
-    assert notes == [
-        "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
-    ]
+    words = "warning: array looks like bits packed eight to a byte; if so, import again with --bitpack"
+    assert notes == [words]
     counts = rng.poisson(20 * share, (1, 2, 40, 16, 64)).astype(np.uint8)
     import_counts(counts, OPTICS, note=notes.append)
     assert len(notes) == 1
@@ -171,9 +170,7 @@ def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make, options, wor
 
 
 BLOCK_BYTES = 4096
-SHEARED = pcii.CameraGrid(
-    rows=2, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=6, width=16, shear_px=(1.5, -2)
-)
+SHEARED = replace(GRID, cols=2, height=6, width=16, shear_px=(1.5, -2))
 
 
 @pytest.mark.parametrize("grid", [GRID, SHEARED])

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from picture_folders import H, W, numbers, run, write
+from command_runs import run_pcii as run
+from picture_folders import H, W, numbers, write
 from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 
@@ -99,12 +100,8 @@ def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
     for frame in frames:
         write(tmp_path / frame["file_path"], numbers(0, 0))
         frame |= {"file_path": frame["file_path"].replace("/", "\\").removesuffix(".png"), "sharpness": 30}
-        frame |= {
-            "camera_angle_x": 2 * math.atan(W / 2 / 50),
-            "cx": "4.0",
-            "k1": None,
-            "k2": "0.0",
-        }  # wins over fl_x
+        frame |= {"camera_angle_x": 2 * math.atan(W / 2 / 50)}  # wins over fl_x
+        frame |= {"cx": "4.0", "k1": None, "k2": "0.0"}
         del frame["transform_matrix"][3]
     path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
     path.write_text(path.read_text(), "utf-16")
@@ -257,10 +254,9 @@ def imported(source: Path, *options: object) -> Dataset:
 
 @pytest.mark.parametrize(("ending", "dtype"), [("png", np.uint16), ("exr", np.float32)])
 def test_pictures_of_any_kind_come_in_by_their_poses(tmp_path: Path, ending, dtype) -> None:
-    dataset = imported(posed(tmp_path / "data", ending=ending, dtype=dtype))
+    dataset: Any = imported(posed(tmp_path / "data", ending=ending, dtype=dtype))
     assert dataset.grid.pitch_mm == (2, 3)
     assert (dataset.grid.focal_mm, dataset.grid.pixel_mm) == (0.2, 0.005)
-    assert dataset.views is not None
     for k, l in np.ndindex(2, 3):
         image = numbers(k, l, dtype)
         light = image if dtype == np.float32 else srgb_to_linear(image)
@@ -270,13 +266,12 @@ def test_pictures_of_any_kind_come_in_by_their_poses(tmp_path: Path, ending, dty
 def test_a_file_of_another_name_and_options_of_light_and_film(tmp_path: Path, capsys) -> None:
     source = posed(tmp_path / "data")
     path = (source / "transforms.json").rename(source / "train.json")
-    dataset = imported(path, "--linear", "--cfa", "GRBG", "--photons", 50, "--focal-mm", 35)
+    dataset: Any = imported(path, "--linear", "--cfa", "GRBG", "--photons", 50, "--focal-mm", 35)
     printed = capsys.readouterr().out
     assert "pictures with a transforms.json of train.json" in printed
     assert "are not in train.json" not in printed
     assert (dataset.grid.focal_mm, dataset.grid.pixel_mm) == (35, 35 / 40)
     assert (dataset.cfa, dataset.light.photons) == ("GRBG", 50)
-    assert dataset.views is not None
     first, second = numbers(1, 2)[0, :2] / 255  # a row of GRBG begins with green and red
     np.testing.assert_allclose(dataset.views.view(1, 2)[0, :2, 0], [first[1], second[0]], rtol=1e-5)
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -44,9 +45,8 @@ def picture(axes: Axes) -> np.ndarray:
     return np.asarray(image.get_array())
 
 
-def colour_bar(axes: Axes) -> Axes:
+def colour_bar(axes: Any) -> Axes:
     """The axes of the only colour bar in a figure."""
-    assert axes.figure is not None
     (bar,) = [each for each in axes.figure.axes if each.get_label() == "<colorbar>"]
     return bar
 
@@ -90,19 +90,10 @@ def test_hardly_any_data_is_drawn_without_a_warning(size: tuple[int, int, int, i
 
 
 def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
-    means = pd.DataFrame(
-        {
-            "method": ["a", "a", "b", "b"],
-            "photons_per_view": [10, 100, 10, None],
-            "seconds": [1.0, 2, 3, 4],
-            "mean": [0.5, 0.75, 0.25, 0.9],
-            "low": [0.25, 0.75, 0.25, 0.9],
-            "high": [1.0, 0.75, 0.25, 0.9],
-            "n": 3,
-        }
-    )
-    figure = accuracy_chart(means, ["b", "a"], "IoU", is_share=True)
-    assert figure is not None
+    values: dict[str, Any] = {"photons_per_view": [10, 100, 10, None], "seconds": [1.0, 2, 3, 4], "n": 3}
+    values |= {"mean": [0.5, 0.75, 0.25, 0.9], "low": [0.25, 0.75, 0.25, 0.9], "high": [1.0, 0.75, 0.25, 0.9]}
+    means = pd.DataFrame({"method": ["a", "a", "b", "b"]} | values)
+    figure: Any = accuracy_chart(means, ["b", "a"], "IoU", is_share=True)
     by_photons, by_seconds = figure.axes
     b, _, _, a, _, _ = (np.asarray(line.get_xydata()).tolist() for line in by_photons.lines)
     assert a == [[10, 0.5], [100, 0.75]]
@@ -112,9 +103,7 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     assert np.shape(by_seconds.lines[0].get_xydata()) == (2, 2)
     figure.draw_without_rendering()
     assert accuracy_chart(means.iloc[:0], ["a"], "IoU", is_share=True) is None
-    bins = pd.DataFrame(
-        {"method": ["a"], "light": ["x"], "confidence": [0.9], "correct": [0.8], "share": [1.0]}
-    )
+    bins = pd.DataFrame([{"method": "a", "light": "x", "confidence": 0.9, "correct": 0.8, "share": 1.0}])
     (panel,) = calibration_chart(bins, ["b", "a"]).axes
     assert panel.collections[0].get_offsets().tolist() == [[0.9, 0.8]]  # type: ignore[union-attr]
 

@@ -150,17 +150,12 @@ def photon_score(
     """
     wide = paper_grid(200, 200)
     i, j, n = np.array([100, 110, 120, 199]), np.array([100, 100, 100, 30]), np.array([3, 1, 2, 1])
-    zero = np.zeros(4, dtype=int)
-    counts = PhotonCounts.from_events(zero, zero, i, j, n, wide)
-    where = {"k": zero, "l": zero, "i": i, "j": j}
+    where = np.zeros(4, dtype=int), np.zeros(4, dtype=int), i, j
+    counts = PhotonCounts.from_events(*where, n, wide)
     # The last photon is projected left of the section and does not count.
-    photons = PhotonTruth(
-        **{name: column.repeat(n) for name, column in where.items()},
-        object_id=np.array([1, 1, 1, 2, 1, 2, 1]),
-        z_mm=np.array([541.0, 541, 541, 625, 541, 625, 541]),
-    )
-    z = np.full((200, 200), np.inf)
-    ids = np.zeros((200, 200), dtype=np.int16)
+    origins = np.array([1, 1, 1, 2, 1, 2, 1]), np.array([541.0, 541, 541, 625, 541, 625, 541])
+    photons = PhotonTruth(*(column.repeat(n) for column in where), *origins)
+    z, ids = np.full((200, 200), np.inf), np.zeros((200, 200), dtype=np.int16)
     z[0], ids[0], z[1], ids[1] = 541.0, 1, 625.0, 2
     true = Truth(z, ids, {1: "near", 2: "far"}, photons, unscored=unscored)
     masks = np.zeros((1, 200, 200), dtype=bool)
@@ -173,25 +168,16 @@ def photon_score(
     return row["photon_precision"], row["photon_recall"]
 
 
-def test_photons_count_once_each_and_by_the_mask_without_photon_in_focus() -> None:
+def test_photons_count_once_each_by_what_is_said_of_their_event_or_by_the_mask() -> None:
     # Of object 1 four photons land inside: three of the first event, one of the third.
     assert photon_score(None) == (1.0, 3 / 4)
-
-
-def test_what_is_said_of_events_goes_before_the_mask() -> None:
     assert photon_score([False, True, True, True]) == (1 / 3, 1 / 4)
     assert photon_score([True, False, True, False]) == (4 / 5, 1.0)
     assert photon_score([False] * 4) == (None, 0.0)
     # The far object does not belong to the only plane.
     assert photon_score([True, False, True, False], "object") == (4 / 5, 1.0)
-
-
-def test_photons_of_what_is_not_scored_do_not_count() -> None:
     assert photon_score([False, True, False, False], "object") == (0.0, 0.0)
-    assert photon_score([False, True, False, False], "object", frozenset({2})) == (None, 0.0)
-
-
-def test_photons_of_other_events_are_refused() -> None:
+    assert photon_score([False, True, False, False], "object", frozenset({2})) == (None, 0.0)  # not scored
     with pytest.raises(InputError, match=r"^photon_in_focus: has 3 events, .* to 4; .*photons=None"):
         photon_score([True] * 3)
 

@@ -140,10 +140,8 @@ def saturated(rate: float, frames: int, bits: int) -> tuple[PhotonCounts, float]
     photons = np.random.default_rng(1).poisson(rates, (frames, *GRID.shape_KLHW))
     counts = np.minimum(photons, most).sum(axis=0)
     held = sum(stats.poisson.sf(n, rates) for n in range(most))
-    return (
-        PhotonCounts.from_dense(counts, GRID, cfa="GRBG", frames=frames, bits=bits),
-        float(1 - np.sum(held) / rates.sum()),
-    )
+    lost = float(1 - np.sum(held) / rates.sum())
+    return PhotonCounts.from_dense(counts, GRID, cfa="GRBG", frames=frames, bits=bits), lost
 
 
 @pytest.mark.parametrize(

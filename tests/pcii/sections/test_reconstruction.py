@@ -1,5 +1,7 @@
 """Sections of counts and of views, sparse and dense: sums and variances of the samples at each voxel."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,14 +35,10 @@ grids = st.builds(
 )
 
 
-def photons(dense: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> PhotonCounts:
-    return PhotonCounts.from_dense(dense, grid, cfa=cfa)
-
-
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
 def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
     dense = np.random.default_rng(seed).poisson(2.0, size=grid.shape_KLHW)
-    sections = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid, cfa=cfa), z, subpixel=subpixel)
     # Whole numbers of radiance have exact float64 sums.
     views = reconstruct(Views(dense[..., None].astype(float), grid, cfa), z, subpixel=subpixel)
     total, coverage = section_twin(dense, grid, cfa, z, subpixel)
@@ -55,7 +53,7 @@ def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
 def test_the_view_from_the_right_moves_right_by_hand():
     grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # at z = 1 the shifts are -1 and +1
     dense = np.array([[[[0, 1, 2, 3]], [[4, 5, 6, 7]]]])
-    sections = reconstruct(photons(dense, grid), 1.0)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid), 1.0)
     assert sections.counts[0, 0, :, 0].tolist() == [1, 2 + 4, 3 + 5, 6]
     assert sections.coverage[0, 0, :, 0].tolist() == [1, 2, 2, 1]
     assert sections.estimate[0, 0, :, 0].tolist() == [1.0, 3.0, 4.0, 6.0]
@@ -64,7 +62,8 @@ def test_the_view_from_the_right_moves_right_by_hand():
 def test_colours_never_mix_by_hand():
     grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # odd shifts: green falls on red
     dense = np.array([[[[1, 10, 2, 20]], [[3, 30, 4, 40]]]])  # G R G R
-    red, green, blue = np.moveaxis(reconstruct(photons(dense, grid, "GRBG"), 1.0).counts[0, 0], -1, 0)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid, cfa="GRBG"), 1.0)
+    red, green, blue = np.moveaxis(sections.counts[0, 0], -1, 0)
     assert red.tolist() == [10, 0, 20 + 30, 0]
     assert green.tolist() == [0, 2 + 3, 0, 4]
     assert blue.tolist() == [0, 0, 0, 0]
@@ -121,15 +120,13 @@ def test_views_on_disk_are_read_once_however_many_planes(monkeypatch: pytest.Mon
     pixels = blocky_texture(np.random.default_rng(0), 16, 16)
     reads: list[tuple[int, int]] = []
 
-    class Reader:
-        shape = (*grid.shape_KLHW, 3)
-
+    class NotingReader(Reader):
         def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
             reads.append(index)
-            return pixels
+            return super().__getitem__(index)
 
-    on_disk, everything = Views(Reader(), grid), Views(np.tile(pixels, (2, 3, 1, 1, 1)), grid)
-    cameras = [(k, l) for k in range(2) for l in range(3)]
+    images, cameras = np.tile(pixels, (2, 3, 1, 1, 1)), list(np.ndindex(2, 3))
+    on_disk, everything = Views(NotingReader(images), grid), Views(images, grid)
     sections = reconstruct(on_disk, [1.0, 2.0, 4.0])
     assert sorted(reads) == cameras
     np.testing.assert_array_equal(sections.counts, reconstruct(everything, [1.0, 2.0, 4.0]).counts)
@@ -161,17 +158,15 @@ def test_sums_and_variances_are_those_of_the_samples(
     shape = (*grid.shape_KLHW, 1 if cfa else channels)
     # Whole numbers of a few digits: their sums are exact in single precision too.
     images = np.random.default_rng(seed).integers(0, 50, shape).astype(np.float64 if double else np.float32)
-    sections = reconstruct(Views(images, grid, cfa), z, variance=True)
+    sections: Any = reconstruct(Views(images, grid, cfa), z, variance=True)
     expected = np.zeros((2, *sections.counts.shape[1:]))
     for where, values in samples_of(images, grid, z, cfa=cfa).items():
         expected[0][where] = sum(values)
         expected[1][where] = np.var(values, ddof=1) if len(values) > 1 else 0
-    assert sections.variance is not None
     np.testing.assert_array_equal(sections.counts[0], expected[0])
     np.testing.assert_allclose(sections.variance[0], expected[1], rtol=1e-5, atol=1e-9)
-    read = reconstruct(Views(Reader(images), grid, cfa), z, variance=True)
+    read: Any = reconstruct(Views(Reader(images), grid, cfa), z, variance=True)
     np.testing.assert_array_equal(read.counts, sections.counts)
-    assert read.variance is not None
     np.testing.assert_allclose(read.variance, sections.variance, rtol=1e-5, atol=1e-9)
     without = reconstruct(Views(images, grid, cfa), z)
     np.testing.assert_array_equal(without.counts, sections.counts)
@@ -191,11 +186,10 @@ def test_variances_of_counts_are_those_of_fractions(cameras, pixels, z, cfa, mos
     dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
     samples = samples_of(dense[..., None], grid, z, cfa=cfa)
     for data in dense_and_sparse(dense, grid, cfa):
-        sections = reconstruct(data, z, variance=True)
+        sections: Any = reconstruct(data, z, variance=True)
         expected = np.zeros(sections.counts.shape[1:])
         for voxel, values in samples.items():
             expected[voxel] = variance_of(values)
-        assert sections.variance is not None
         # One rounding of each of numerator and denominator, and of the quotient.
         np.testing.assert_allclose(sections.variance[0], expected, rtol=5e-16)
 

@@ -102,14 +102,11 @@ def test_results_of_other_software_are_named(tmp_path: Path, capsys: pytest.Capt
     assert "2 files match the manifest; other software made them: " in capsys.readouterr().out
 
 
-FOLDERS: list[Any] = [DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER]
+FOLDERS = [DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER]
+of_each_kind = pytest.mark.parametrize("kind", FOLDERS, ids=lambda kind: kind.what)
 
 
-@pytest.fixture(params=FOLDERS, ids=lambda kind: kind.what)
-def kind(request: pytest.FixtureRequest) -> Any:
-    return request.param
-
-
+@of_each_kind
 def test_only_new_and_empty_folders_and_those_of_its_kind_are_written_to(kind: Any, tmp_path: Path) -> None:
     assert kind.guard(tmp_path / "new" / "deep") == kind.guard(tmp_path) == set()
     (tmp_path / f".{kind.document}.x1.tmp").touch()  # left by a kill
@@ -130,6 +127,7 @@ def test_only_new_and_empty_folders_and_those_of_its_kind_are_written_to(kind: A
     assert file.read_text() == "years of work"
 
 
+@of_each_kind
 def test_a_document_that_is_missing_or_of_others_is_refused(kind: Any, tmp_path: Path) -> None:
     path, nowhere = tmp_path / kind.document, tmp_path / "nowhere"
     assert f"no such {kind.what} folder" in one_sentence(lambda: kind.read(nowhere), nowhere)
@@ -219,6 +217,9 @@ def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None
     assert set(split.unique()["test"]) == {9, 19}
 
 
+SCENE_4, SCENE_5 = "scene_4_seed_1", "scene_5_seed_1"
+
+
 def forge_a_path(folder: Path) -> None:
     rows = [json.loads(line) for line in (folder / INDEX).read_text().splitlines()[:-1]]
     rows[0]["path"] = "../elsewhere"
@@ -229,11 +230,8 @@ def forge_a_path(folder: Path) -> None:
     ("harm", "words"),
     [
         (forge_a_path, "not of a dataset in this folder"),
-        (
-            lambda path: shutil.copy(path / "scene_5_seed_1" / MANIFEST, path / "scene_4_seed_1"),
-            "not the one that",
-        ),
-        (lambda path: shutil.rmtree(path / "scene_4_seed_1"), "missing or unfinished"),
+        (lambda path: shutil.copy(path / SCENE_5 / MANIFEST, path / SCENE_4), "not the one that"),
+        (lambda path: shutil.rmtree(path / SCENE_4), "missing or unfinished"),
     ],
 )
 def test_what_no_checksum_of_a_file_tells_is_refused(

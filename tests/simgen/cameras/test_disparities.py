@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twins import paper_grid
 
 from pcii.sections import reconstruct
 from pcii.types import CameraGrid, PhotonCounts
@@ -18,9 +19,7 @@ def at_disparity(pixels: float, **more: Any) -> tuple[CameraGrid, float]:
 
 
 def test_objects_of_the_paper_are_15_px_of_blur_apart() -> None:
-    grid = CameraGrid(
-        rows=10, cols=10, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.0352, height=1024, width=1024
-    )
+    grid = paper_grid()
     by_hand = 9 * (50 * 5 / 0.0352) * (1 / 540 - 1 / 620)
     assert apart_px(grid, 540, 620) == pytest.approx(by_hand)
     # The longer axis decides, be it of columns or of rows.

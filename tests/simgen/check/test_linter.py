@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from command_runs import run_simgen
 from lit_scenes import LAMP, ball
 
-from pcii.base import command_line
-from simgen.app import commands as cli
 from simgen.cameras import coarser, disparities_px
 from simgen.check import Facts, Finding, ObjectFacts, findings, probe_scene
 from simgen.dataset import Prepared, peak_bytes, product_bytes
@@ -37,18 +36,9 @@ def thing(name: str, *z_mm: float, share: float = 0.1, light: np.ndarray = EVEN,
 def facts(*objects: ObjectFacts, recipe: dict[str, Any] | None = None, **more: Any) -> Facts:
     glass = ball("a", 0, 540, finish={"type": "glass"})
     scene = {"objects": [glass]} if more.pop("glass", False) else {"backdrop": more.pop("backdrop", None)}
-    known = {
-        "corners": 4,
-        "luminance": 1.0,
-        "colour_share": np.array([0.25, 0.5, 0.25]),
-        "other_shares": {},
-        "lamps_away": (),
-        "plan": Plan(thins=True, samples=8, photons_per_view=1000.0),
-        "path_s": 1e-7,
-        "hit_s": 1e-7,
-        "is_compiled": True,
-        "memory_bytes": 1e12,
-    }
+    known = {"corners": 4, "luminance": 1.0, "colour_share": np.array([0.25, 0.5, 0.25])}
+    known |= {"other_shares": {}, "lamps_away": (), "path_s": 1e-7, "hit_s": 1e-7}
+    known |= {"plan": Plan(True, 8, 1000.0), "is_compiled": True, "memory_bytes": 1e12}
     return Facts(target=target_of(recipe or {}, **scene), objects=objects, **(known | more))
 
 
@@ -259,7 +249,7 @@ def test_a_coarser_film_has_the_same_field_of_view() -> None:
 
 @pytest.mark.renders
 def test_the_small_recipe_passes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command_line.run(cli.app, ["check", "small", "--set", "seed=3", "--json"]) == 0
+    assert run_simgen("check", "small", "--set", "seed=3", "--json") == 0
     rows = json.loads(capsys.readouterr().out)
     # Its shifts at 540 mm are multiples of 12 px but for rounding: -30, -18, -6, 6, 18, 30.
     assert {row["subject"] for row in rows if row["verdict"] != "ok"} == {"colours"}
@@ -272,13 +262,13 @@ def test_exit_codes_of_broken_scenes(capsys: pytest.CaptureFixture[str], tmp_pat
     lost = ball("lost", 0, -500, GREY, radius_mm=20)
     text = tomli_w.dumps({"title": "broken", "objects": [lost], "lights": [SKY]})
     file.write_text(text)
-    assert command_line.run(cli.app, ["check", str(file)]) == 1
+    assert run_simgen("check", file) == 1
     output = capsys.readouterr()
     assert "lost is at z = -520 to -480 mm" in output.out
     assert output.err == ""
     file.write_text(text.replace("radius_mm", "radius"))
     for target, words in ((tmp_path, "radius"), ("nowhere", "there is no scene or recipe 'nowhere'")):
-        assert command_line.run(cli.app, ["check", str(target)]) == 2
+        assert run_simgen("check", target) == 2
         assert words in capsys.readouterr().err
-    assert command_line.run(cli.app, ["check", "two_objects", "--set", "seed=1"]) == 2
+    assert run_simgen("check", "two_objects", "--set", "seed=1") == 2
     assert "name a recipe" in capsys.readouterr().err

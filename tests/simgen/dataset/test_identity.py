@@ -10,28 +10,27 @@ import numpy as np
 import pytest
 import tomli_w
 import zarr
+from command_runs import run_simgen
 from tiny import TINY_RECIPE
 
-from pcii.base import InputError, command_line
+from pcii.base import InputError
 from pcii.store import TRUTH, provenance
-from simgen.app import commands as cli
 from simgen.dataset import Prepared, check_resources, generate, peak_bytes, prepare, shortage
 from simgen.photons import Plan
 from simgen.spec import Analysis, Recipe
 
 Table = dict[str, Any]
-
 CARD = {"type": "card", "width_mm": 20.0, "height_mm": 30.0}
+MESH = {"type": "mesh", "file": "a.ply"}
 SCENE: Table = {
     "title": "one of each kind of file",
     "objects": [
         {"name": "picture", "position_mm": [0, 0, 500], "shape": CARD, "material": {"texture": "a.png"}},
-        {"name": "mesh", "position_mm": [0, 0, 600], "shape": {"type": "mesh", "file": "a.ply"}},
+        {"name": "mesh", "position_mm": [0, 0, 600], "shape": MESH, "material": {"reflectance": "dark skin"}},
     ],
     "lights": [{"type": "environment", "file": "a.exr", "luminance_cd_m2": 100.0}],
     "planes_mm": [540.0, 620.0],
 }
-SCENE["objects"][1]["material"] = {"reflectance": "dark skin"}
 PLAIN = {"title": "even light", "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}]}
 RECIPE: Table = {
     "scene": "here",
@@ -178,7 +177,7 @@ def recipe(**values: Any) -> Recipe:
     return Recipe.model_validate({"scene": "two_objects", **values})
 
 
-TOO_MUCH: list[tuple[dict[str, Any], str]] = [
+TOO_MUCH: list[tuple[Table, str]] = [
     ({"sensor": {"dark_counts": 1e6}}, "sensor.dark_counts"),
     ({"sensor": {"hot_pixel_share": 0.01, "hot_pixel_counts": 1e9}}, "sensor.hot_pixel_share"),
     ({"grid": {"rows": 10**8}}, "grid.rows"),
@@ -225,10 +224,10 @@ def test_a_disk_that_is_too_small_is_named_unless_views_are_there(
 @pytest.mark.renders
 def test_commands_refuse_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     setting, out = "sensor.dark_counts=1e6", tmp_path / "out"
-    assert command_line.run(cli.app, ["check", "paper", "--set", setting]) == 1
+    assert run_simgen("check", "paper", "--set", setting) == 1
     sentence = "sensor.dark_counts: takes some 21000 TB of memory, and this machine has"
     assert f"bad   memory      {sentence}" in capsys.readouterr().out
-    assert command_line.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
+    assert run_simgen("generate", "paper", "--set", setting, "-o", out) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"error: {sentence}")
     assert error.count("\n") == 1

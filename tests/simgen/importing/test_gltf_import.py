@@ -212,12 +212,9 @@ def material_of(
 
 
 def test_numbers_of_materials(tmp_path: Path) -> None:
+    base = {"baseColorFactor": [0.5, 0.25, 1.0, 1.0], "metallicFactor": 0.25, "roughnessFactor": 0.4}
     material = {
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [0.5, 0.25, 1.0, 1.0],
-            "metallicFactor": 0.25,
-            "roughnessFactor": 0.4,
-        },
+        "pbrMetallicRoughness": base,
         "emissiveFactor": [2.0, 1.0, 0.0],  # above 1, as before KHR_materials_emissive_strength
         "extensions": {
             "KHR_materials_transmission": {"transmissionFactor": 0.3},
@@ -246,12 +243,8 @@ def test_pictures_are_split_and_multiplied(tmp_path: Path) -> None:
     packed = RNG.integers(0, 256, (4, 4, 3), dtype=np.uint8)
     tilts = np.full((4, 4, 3), (128, 128, 255), np.uint8)
     colour, numbers, tilt = (draft.texture(png(pixels)) for pixels in (colours, packed, tilts))
-    numbers_of_surface = {
-        "baseColorTexture": {"index": colour},
-        "baseColorFactor": [1.0, 0.5, 0.25, 1.0],
-        "metallicRoughnessTexture": {"index": numbers},
-        "metallicFactor": 0.5,
-    }
+    numbers_of_surface = {"baseColorTexture": {"index": colour}, "baseColorFactor": [1.0, 0.5, 0.25, 1.0]}
+    numbers_of_surface |= {"metallicRoughnessTexture": {"index": numbers}, "metallicFactor": 0.5}
     material = {"pbrMetallicRoughness": numbers_of_surface, "normalTexture": {"index": tilt}}
     made, left_out = material_of(material, tmp_path, draft)
     folder = tmp_path / "scene"
@@ -371,14 +364,8 @@ def test_what_the_file_says_and_the_scene_does_not_have_is_named(tmp_path: Path)
     """Of nodes, meshes, materials, pictures, cameras and of the file itself, each once."""
     draft = GltfDraft()
     texture = draft.texture(png(QUARTERS), magFilter=9728, wrapS=33071, wrapT=10497)
-    material = {
-        "name": "m",
-        "pbrMetallicRoughness": {
-            "baseColorTexture": {"index": texture},
-            "roughnessFactor": 1.0000001,
-            "metallicFactor": -1e-9,
-        },
-        "doubleSided": False,
+    base = {"baseColorTexture": {"index": texture}, "roughnessFactor": 1.0000001, "metallicFactor": -1e-9}
+    material = {"name": "m", "pbrMetallicRoughness": base, "doubleSided": False} | {
         "occlusionTexture": {"index": texture},
         "extensions": {"KHR_materials_unlit": {}, "KHR_materials_sheen": {}, "KHR_materials_ior": {"ior": 9}},
     }

@@ -102,10 +102,8 @@ def test_a_hole_in_a_dark_room_shows_the_sky_in_every_view() -> None:
     for sign in (-1, 1):
         walls += [((0, sign * across, 500), (0, 0, 0), (along, width_mm))]
         walls += [((sign * across, 0, 500), (0, 0, 0), (width_mm, side_mm))]
-        walls += [
-            ((0, sign * 300, 150), (90, 0, 0), (700, 900)),
-            ((sign * 300, 0, 150), (0, 90, 0), (900, 700)),
-        ]
+        walls += [((0, sign * 300, 150), (90, 0, 0), (700, 900))]
+        walls += [((sign * 300, 0, 150), (0, 90, 0), (900, 700))]
     parts = []
     for number, (place, turn, (width, height)) in enumerate(walls):
         part = simgen.Card(width_mm=width, height_mm=height)

@@ -19,15 +19,8 @@ def pilot(seed: int, number: int = 4000) -> Samples:
     colour = np.array([[5.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.0]])[which]
     light = colour * rng.uniform(0.5, 1.2, (number, 1))
     light[number // 2 :] = np.nan
-    return Samples(
-        k=rng.integers(0, 3, number),
-        l=rng.integers(0, 4, number),
-        row=rng.integers(0, 96, number),
-        col=rng.integers(0, 128, number),
-        z_mm=np.array([300.0, 420.0, np.inf])[which],
-        guess=np.maximum(colour, 1e-9),
-        light=light,
-    )
+    places = (rng.integers(0, size, number) for size in GRID.shape_KLHW)
+    return Samples(*places, np.array([300.0, 420.0, np.inf])[which], np.maximum(colour, 1e-9), light)
 
 
 @pytest.fixture
@@ -37,11 +30,9 @@ def majorant() -> Majorant:
 
 
 def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Majorant) -> None:
-    samples = pilot(2)
+    samples, layers = pilot(2), majorant.layers
     entry = majorant.owner_of(samples)
-    side = majorant.side_px[entry]
-    layer = majorant.layer[entry]
-    layers = majorant.layers
+    side, layer = majorant.side_px[entry], majorant.layer[entry]
     down = np.where(layer < 0, 0, layers.row_shift[layer, samples.k])
     right = np.where(layer < 0, 0, layers.col_shift[layer, samples.l])
     np.testing.assert_array_equal((samples.row + down) // side, majorant.row[entry])
@@ -86,9 +77,8 @@ def test_a_gap_in_a_surface_is_listed_with_the_bound_of_what_is_around_it() -> N
     zero, light = np.zeros_like(row), np.ones((row.size, 3))
     samples = Samples(zero, zero, row, col, np.full(row.size, 300.0), light, light)
     majorant = fit(grid, layers_for(grid, tile_px, samples.z_mm), samples, DIM)
-    middle = np.array([21 * tile_px])
-    beside = np.array([31 * tile_px])
-    inside = Samples(zero[:1], zero[:1], middle, beside, np.array([300.0]), light[:1], light[:1])
+    middle = np.array([21 * tile_px]), np.array([31 * tile_px])
+    inside = Samples(zero[:1], zero[:1], *middle, np.array([300.0]), light[:1], light[:1])
     (entry,) = majorant.owner_of(inside)
     assert majorant.layer[entry] >= 0
     np.testing.assert_allclose(majorant.bound[entry], 1.0, rtol=1e-6)

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import zarr
 from lit_scenes import EVENLY, LAMP, build_scene, two_balls
-from photon_statistics import counted, is_poisson, p_value
+from photon_statistics import counted, has_mean, is_poisson, p_value
 
 from pcii.base import InputError, silent
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name
@@ -28,9 +28,8 @@ HEIGHT, WIDTH = 8, 10
 def recipe(rows: int = 2, cols: int = 2, **changes: object) -> Recipe:
     """Few pixels whose films are as large as the scene."""
     grid = {"rows": rows, "cols": cols, "height": HEIGHT, "width": WIDTH, "pixel_mm": 4.0}
-    return Recipe.model_validate(
-        {"scene": "two_objects", "seed": 1, "grid": grid, "photons": nested()} | changes
-    )
+    values = {"scene": "two_objects", "seed": 1, "grid": grid, "photons": nested()}
+    return Recipe.model_validate(values | changes)
 
 
 def nested(**photons: object) -> dict:
@@ -53,8 +52,7 @@ def thin(made: Recipe, render_scene: RenderScene, plan: Plan = PLAN) -> PhotonTa
 
 def without_scene(made: Recipe) -> Capture:
     """For counts that are drawn from made-up views."""
-    no_scene: Any = None
-    return capture_of(made, no_scene, made.seed)
+    return capture_of(made, cast(Any, None), made.seed)
 
 
 def dense(made: Recipe) -> PhotonTable:
@@ -101,11 +99,9 @@ def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
     for budget in BUDGETS:
         assert is_poisson(found[budget], budget)
         assert not is_poisson(2 * found[budget], budget)
-    for budget, larger in ((40, 120), (8, 40)):
-        always_a_part = np.rint(found[larger] * budget / larger)  # the faults: no chance in how many,
-        always_as_many = np.full(found[larger].size, budget)  # or as many each time
-        assert not is_poisson(always_a_part, budget)
-        assert not is_poisson(always_as_many, budget)
+    for budget, larger in ((40, 120), (8, 40)):  # the faults: no chance in how many, or as many each time
+        assert not is_poisson(np.rint(found[larger] * budget / larger), budget)
+        assert not is_poisson(np.full(found[larger].size, budget), budget)
 
 
 @pytest.mark.renders
@@ -158,9 +154,8 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
 
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
-    arrivals, log = draw_from_views(
-        without_scene(made), lambda k, l: (k * mosaic_of(k, l), np.zeros(3)), PLAN, silent
-    )
+    capture = without_scene(made)
+    arrivals, log = draw_from_views(capture, lambda k, l: (k * mosaic_of(k, l), np.zeros(3)), PLAN, silent)
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
         totals = by_scope(by_pixel(subset(arrivals, made, budget), made), "view")
@@ -175,15 +170,8 @@ def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
     return np.stack([counts.view(k, l) for k, l in np.ndindex(made.grid.rows, made.grid.cols)])
 
 
-FAULTY = {
-    "quantum_efficiency": (0.8, 0.9, 0.7),
-    "dark_counts": 0.05,
-    "hot_pixel_share": 0.05,
-    "hot_pixel_counts": 4.0,
-    "dead_pixel_share": 0.05,
-}
-
-
+FAULTY = {"quantum_efficiency": (0.8, 0.9, 0.7), "dark_counts": 0.05, "dead_pixel_share": 0.05}
+FAULTY |= {"hot_pixel_share": 0.05, "hot_pixel_counts": 4.0}
 IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
 
 
@@ -197,10 +185,8 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
     assert small.sum() < middle.sum() < whole.sum()
     assert log["total"] == whole.sum()
     assert log["pixels_with_photons"] == (whole > 0).sum()
-    assert log["nested"] == [
-        {"budget": budget, "total": part.sum(), "pixels_with_photons": (part > 0).sum()}
-        for budget, part in ((8, small), (40, middle))
-    ]
+    for row, budget, part in zip(log["nested"], (8, 40), (small, middle), strict=True):
+        assert row == {"budget": budget, "total": part.sum(), "pixels_with_photons": (part > 0).sum()}
     assert not (tmp_path / PHOTON_TRUTH).exists()  # rendered views do not know what a photon came from
 
 
@@ -209,7 +195,7 @@ def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     write_counts(without_scene(lost), lost.sensor, dense(lost), tmp_path, with_origins=True)
     whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
     np.testing.assert_array_equal(whole, small)
-    assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
+    assert has_mean(whole, 0.5)
 
 
 def from_known_places(made: Recipe) -> PhotonTable:
@@ -371,10 +357,8 @@ def excess(scene: RenderScene, radiance: np.ndarray, gain: float, samples: int) 
     """By how much counts drawn from noisy views are more dispersed than Poisson ones, as a share of that."""
     rng = np.random.default_rng(1)
     rates = gain * radiance
-    squares = [
-        (rng.poisson(gain * seen(scene, samples, seed)) - rates) ** 2 / rates.sum() for seed in range(DRAWS)
-    ]
-    return float(np.sum(squares) / DRAWS - 1)
+    drawn = [rng.poisson(gain * seen(scene, samples, seed)) for seed in range(DRAWS)]
+    return float(((np.array(drawn) - rates) ** 2).sum() / rates.sum() / DRAWS - 1)
 
 
 @pytest.mark.renders

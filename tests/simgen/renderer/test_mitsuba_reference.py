@@ -9,27 +9,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run_simgen
 from lit_scenes import ball
 from PIL import Image
 
 import simgen
-from pcii.base import LUMINANCE, InputError, command_line
+from pcii import Optics
+from pcii.base import LUMINANCE, InputError
 from pcii.types import CameraGrid
-from simgen.app import commands as simgen_cli
 from simgen.renderer import backend, reference_to
 from simgen.spec import MitsubaFile
 
 SIDE, TILES, REPEATS, SAMPLES, DEPTH = 48, 8, 6, 48, 5
 ANGLE_DEG, FOCAL_MM = 35.0, 50.0
-GRID = CameraGrid(
-    rows=1,
-    cols=1,
-    pitch_mm=(1.0, 1.0),
-    focal_mm=FOCAL_MM,
-    pixel_mm=2 * FOCAL_MM * np.tan(np.radians(ANGLE_DEG / 2)) / SIDE,
-    height=SIDE,
-    width=SIDE,
-)
+SENSOR_MM = 2 * FOCAL_MM * np.tan(np.radians(ANGLE_DEG / 2))
+GRID = Optics(pitch_mm=(1, 1), focal_mm=FOCAL_MM, sensor_mm=SENSOR_MM).grid((1, 1, SIDE, SIDE))
 CAMERA = f"""<sensor type="perspective" id="front"><float name="fov" value="{ANGLE_DEG}"/>
 <transform name="to_world"><lookat origin="0.5,0.6,4" target="0,0,0" up="0,1,0"/></transform>
 <film type="hdrfilm"><integer name="width" value="{SIDE}"/><integer name="height" value="{SIDE}"/>
@@ -67,6 +61,7 @@ FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"
 </medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
 <bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
 OBJ = '<shape type="obj"><string name="filename" value="%s"/></shape>'
+DEFAULT = '<default name="d" value="."/>'
 SURFACE = '<shape type="sphere"><bsdf type="%s">%s</bsdf></shape>'
 PICTURE = '<texture type="bitmap" name="reflectance"/>'
 BALL = ball("ball", 0, 3000, radius_mm=300)
@@ -100,18 +95,13 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
 ) -> None:
     scene = scene_of(folder, CAMERA + ROOM + content)
     counts, truth = simgen.draw_photons(scene, GRID, budget=10_000, cfa=None, seed=1, max_depth=DEPTH)
-    ours = tiles_of(
-        [
-            simgen.render(scene, GRID, samples_per_pixel=SAMPLES, max_depth=DEPTH, seed=seed).view(0, 0)
-            for seed in range(REPEATS)
-        ]
-    )
-    mi = backend.load()
+    options: dict[str, Any] = {"samples_per_pixel": SAMPLES, "max_depth": DEPTH}
+    views = [simgen.render(scene, GRID, seed=seed, **options).view(0, 0) for seed in range(REPEATS)]
+    ours, mi = tiles_of(views), backend.load()
     file = mi.load_file(str(folder / "scene.xml"), optimize=False)
     path = mi.load_dict({"type": "path" if is_thinned else "volpath", "max_depth": DEPTH})
-    theirs = tiles_of(
-        [np.array(mi.render(file, integrator=path, spp=SAMPLES, seed=100 + seed)) for seed in range(REPEATS)]
-    )
+    seeds = range(100, 100 + REPEATS)
+    theirs = tiles_of([np.array(mi.render(file, integrator=path, spp=SAMPLES, seed=seed)) for seed in seeds])
     error = np.sqrt((ours.var(axis=0, ddof=1) + theirs.var(axis=0, ddof=1)) / REPEATS)
     z = (ours.mean(axis=0) - theirs.mean(axis=0)) / error
     # Of Student's distribution with 10 degrees of freedom the mean square is 1.25, of 192 values to 15 %.
@@ -184,12 +174,7 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
     [
         ("", '<path value="plugins"/>', "ascii", "<path> is not followed"),
         ("", '<bsdf type="../../evil"/>', "ascii", "outside the scene's folder"),
-        (
-            "",
-            '<default name="d" value="."/>' + OBJ % "$d$d/secret.obj",
-            "ascii",
-            "outside the scene's folder",
-        ),
+        ("", DEFAULT + OBJ % "$d$d/secret.obj", "ascii", "outside the scene's folder"),
         ("", OBJ % "linked.obj", "ascii", "lies outside the folder"),
         ("", '<include filename="scene.xml"/><include filename="scene.xml"/>', "ascii", "deep"),
         ("", "<bsdf type='twosided'>" * 100 + "</bsdf>" * 100, "ascii", "100 deep"),
@@ -391,6 +376,6 @@ def test_without_mitsuba_one_sentence_says_what_to_install(
     find: Callable[..., object] = importlib.util.find_spec
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "mitsuba" else find(name))
     monkeypatch.chdir(tmp_path)
-    assert command_line.run(simgen_cli.app, command.split()) == 2
+    assert run_simgen(*command.split()) == 2
     sentence = "error: mitsuba: not installed, and needed for rendering; type in the source tree:  "
     assert capsys.readouterr().err == sentence + "pip install '.[render]'\n"

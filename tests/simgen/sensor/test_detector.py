@@ -9,6 +9,7 @@ import pytest
 from photon_statistics import counted, has_mean, is_poisson
 from scipy import stats
 
+from pcii import Optics
 from pcii.base import InputError
 from pcii.types import CameraGrid, colour_index, mosaic
 from simgen.sensor import PhotonTable, dark_map, detect, draw_counts, full_light_image, no_photons, read_out
@@ -20,9 +21,7 @@ COLUMNS = [field.name for field in fields(PhotonTable)]
 
 
 def films(rows: int, cols: int, height: int, width: int) -> CameraGrid:
-    return CameraGrid(
-        rows=rows, cols=cols, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.1, height=height, width=width
-    )
+    return Optics(pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.1).grid((rows, cols, height, width))
 
 
 GRID = films(2, 3, 50, 60)
@@ -55,20 +54,13 @@ def test_counts_have_mean_and_variance_of_their_rate(rate: float) -> None:
     assert not has_mean(2 * counts, rate)  # the fault of a well-known simulator at low light
 
 
-FAULTS = (
-    {"quantum_efficiency": (1.0, 0.9, 1.0)},
-    {"dark_counts": 0.01},
-    {"hot_pixel_share": 0.01},
-    {"dead_pixel_share": 0.01},
-)
-
-
 def test_a_sensor_without_faults_changes_no_bit() -> None:
     arrivals = poisson(0.7, seed=1)
     counts = detect(arrivals, GRID, "GRBG", Sensor(), seed=1)
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(counts, name), getattr(arrivals, name))
-    for fault in FAULTS:
+    shares = ({name: 0.01} for name in ("dark_counts", "hot_pixel_share", "dead_pixel_share"))
+    for fault in ({"quantum_efficiency": (1.0, 0.9, 1.0)}, *shares):
         assert (detected(arrivals, Sensor.model_validate(fault), 1) != counted(arrivals, GRID)).any()
 
 
@@ -231,19 +223,14 @@ def test_which_counts_a_counter_keeps_is_left_to_chance(n: list[int], bits: int)
     assert kept.object_id.tolist() != other.object_id.tolist()
 
 
-GAIN = 20.0
-SIDE = 200
+GAIN, SIDE = 20.0, 200
 
 
 def read_image(
-    radiance: np.ndarray,
-    light: FullLight,
-    cfa: str | None = None,
-    dark_map: np.ndarray | None = None,
-    **sensor: object,
+    radiance: np.ndarray, light: FullLight, cfa: str | None = None, dark: Any = None, **sensor: object
 ) -> np.ndarray:
     settings = Sensor.model_validate({"full_light": light, **sensor})
-    return full_light_image(radiance, cfa, GAIN, settings, np.random.default_rng(1), dark_map)
+    return full_light_image(radiance, cfa, GAIN, settings, np.random.default_rng(1), dark)
 
 
 def even(value: float, channels: int = 1) -> np.ndarray:
@@ -251,17 +238,17 @@ def even(value: float, channels: int = 1) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("cfa", "channels", "read_noise_e"),
-    [("GRBG", 1, 2.0), ("GRBG", 3, 40.0), (None, 1, 40.0), (None, 3, 2.0)],
+    ("cfa", "channels", "noise_e"), [("GRBG", 1, 2.0), ("GRBG", 3, 40.0), (None, 1, 40.0), (None, 3, 2.0)]
 )
-def test_an_image_of_mid_light_is_radiance_with_noise_of_electrons(
-    cfa: str | None, channels: int, read_noise_e: float
+def test_mid_light_is_radiance_with_noise_of_electrons(
+    cfa: str | None, channels: int, noise_e: float
 ) -> None:
     colours = np.array([30.0, 50.0, 70.0], dtype=np.float32)
     radiance = even(50.0) if channels == 1 else even(1.0, 3) * colours
     dark = np.tile([0.0, 0.0, 90.0, 90.0], (SIDE, SIDE // 4))
-    light = FullLight(read_noise_e=read_noise_e)
-    image = read_image(radiance, light, cfa, dark, quantum_efficiency=EFFICIENCY).astype(np.float64)
+    image = read_image(
+        radiance, FullLight(read_noise_e=noise_e), cfa, dark, quantum_efficiency=EFFICIENCY
+    ).astype(np.float64)
     assert image.shape == radiance.shape
     efficiency = np.array(EFFICIENCY)
     if channels == 1:
@@ -271,7 +258,7 @@ def test_an_image_of_mid_light_is_radiance_with_noise_of_electrons(
     step_e = 10_000 / 4095
     electrons = image * gain
     expected = radiance * gain + dark[..., None]
-    variance = expected + read_noise_e**2 + step_e**2 / 12
+    variance = expected + noise_e**2 + step_e**2 / 12
     for one in np.unique(expected):
         here = expected == one
         spread = np.sqrt(variance[here].mean() / here.sum())

@@ -10,31 +10,20 @@ from typing import Any
 
 import pytest
 
+import simgen
 from pcii.base import InputError
-from simgen import (
-    Backdrop,
-    Box,
-    Card,
-    Glass,
-    Material,
-    PointLight,
-    Scene,
-    SceneObject,
-    Spectrum,
-    Sphere,
-    UniformLight,
-    load_scene,
-)
+from simgen import Material, Scene, SceneObject, Spectrum, Sphere, load_scene
 from simgen.base import LARGEST_TOML_BYTES, toml_text, validate
 from simgen.spec import scene_names
 
 RED = Material(reflectance=(0.8, 0.1, 0.1))
 BALL = SceneObject(name="ball", position_mm=(10, 0, 540), shape=Sphere(radius_mm=30), material=RED)
-CARD = SceneObject(name="card", position_mm=(0, 5, 620), shape=Card(width_mm=9, height_mm=8), material=RED)
-SKY = UniformLight(luminance_cd_m2=100)
+PANE = simgen.Card(width_mm=9, height_mm=8)
+CARD = SceneObject(name="card", position_mm=(0, 5, 620), shape=PANE, material=RED)
+SKY = simgen.UniformLight(luminance_cd_m2=100)
 SCENE = Scene(title="Two things", objects=(BALL, CARD), lights=(SKY,), planes_mm=(540,))
 WITH_FILE = SCENE.replace("ball", material=Material(texture="a.png"))
-BOX: Any = Box(width_mm=1, height_mm=1, depth_mm=1)
+BOX: Any = simgen.Box(width_mm=1, height_mm=1, depth_mm=1)
 
 
 def fault_of(make: Callable[[], Any]) -> str:
@@ -49,7 +38,7 @@ def fault_of(make: Callable[[], Any]) -> str:
     ("make", "expected"),
     [
         (lambda: Sphere(radius_mm=-1), "Sphere: 'radius_mm': input should be greater than"),
-        (lambda: Material(finish=Glass(), texture="a.png"), "Material: texture: the colour of glass"),
+        (lambda: Material(finish=simgen.Glass(), texture="a.png"), "Material: texture: the colour of glass"),
         (lambda: Spectrum(wavelength_nm=(400, 500), value=(0.5,)), "Spectrum: give as many values"),
         (lambda: Scene(title="x", lights=()), "Scene: 'lights': nothing shines"),
         (lambda: setattr(BALL, "name", "b"), "SceneObject: 'name': instance is frozen"),
@@ -88,7 +77,7 @@ def test_a_fault_deep_in_a_table_keeps_its_place() -> None:
 
 
 def test_each_change_is_a_new_checked_scene() -> None:
-    lamp = PointLight(position_mm=(0, -300, 300), intensity_cd=5)
+    lamp = simgen.PointLight(position_mm=(0, -300, 300), intensity_cd=5)
     more = SCENE.add(BALL.change(name="other"), lamp)
     assert [thing.name for thing in more.objects] == ["ball", "card", "other"]
     assert more.lights == (SKY, lamp)
@@ -96,7 +85,7 @@ def test_each_change_is_a_new_checked_scene() -> None:
     swapped = SCENE.replace("ball", CARD.change(name="second"))
     assert [thing.name for thing in swapped.objects] == ["second", "card"]
     assert SCENE.replace("ball", name="marble").object("marble") == BALL.change(name="marble")
-    lit = SCENE.change(lights=(lamp,), backdrop=Backdrop(z_mm=900))
+    lit = SCENE.change(lights=(lamp,), backdrop=simgen.Backdrop(z_mm=900))
     assert (lit.lights, lit.objects) == ((lamp,), SCENE.objects)
     assert Scene(title="Two things", objects=(BALL, CARD), lights=(SKY,), planes_mm=(540,)) == SCENE
 

@@ -99,15 +99,9 @@ SHAPES: dict[str, dict] = {
     "box": {"type": "box", "width_mm": 60.0, "height_mm": 60.0, "depth_mm": 60.0},
 }
 # Sides of a box, and ends of a cylinder: turned towards the cameras, how does their picture lie?
-TURNED: list[tuple[str, Vector]] = [
-    ("box", (0, 90, 0)),
-    ("box", (0, -90, 0)),
-    ("box", (0, 180, 0)),
-    ("box", (90, 0, 0)),
-    ("box", (-90, 0, 0)),
-    ("cylinder", (90, 0, 0)),
-    ("cylinder", (-90, 0, 0)),
-]
+ABOUT_X: list[Vector] = [(90, 0, 0), (-90, 0, 0)]
+ABOUT_Y: list[Vector] = [(0, 90, 0), (0, -90, 0), (0, 180, 0)]
+TURNED = [*(("box", turn) for turn in ABOUT_Y + ABOUT_X), *(("cylinder", turn) for turn in ABOUT_X)]
 
 
 @pytest.mark.parametrize(
