@@ -71,9 +71,8 @@ def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -
 
 
 def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
-    assert (
-        pcii.import_hci(hci_folder(tmp_path / "scene")).z_range_mm is None
-    )  # 8 px are so coarse that -1.6 px would be beyond infinity
+    coarse = pcii.import_hci(hci_folder(tmp_path / "scene"))
+    assert coarse.z_range_mm is None  # 8 px are so coarse that -1.6 px would be beyond infinity
     text = PARAMETERS.format(height=512, width=512, rows=1, cols=1)
     (tmp_path / "parameters.cfg").write_text(text)
     write(tmp_path / "input_Cam000.png", np.zeros((512, 512, 3), np.uint8))

@@ -20,9 +20,11 @@ from pcii.store import (
     CARD,
     CERTIFICATE,
     COLLECTION,
+    CROISSANT,
     INDEX,
     LICENCE,
     MARKER,
+    hash_file,
     hash_json,
     open_collection,
     open_dataset,
@@ -193,6 +195,9 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
     for file in (CARD, LICENCE):
         assert all("CC-BY-4.0" in (folder / file).read_text() for folder in folders)
     assert (made[2] / CARD).read_text().startswith("# two scenes\n")
+    described = json.loads((made[2] / CROISSANT).read_text())
+    assert described["license"] == "https://spdx.org/licenses/CC-BY-4.0.html"
+    assert described["distribution"][0]["sha256"] == hash_file(made[2] / INDEX)
 
 
 def test_making_it_in_two_steps_gives_the_published_bytes(
