@@ -57,6 +57,11 @@ def import_images(
     pictures. Raises `InputError`, naming a file, for what does not fit.
     """
     if isinstance(source, np.ndarray):
+        if not all(isinstance(path, Path) for path in source.flat):
+            raise InputError(
+                f"source: expected an array (K, L) of Path, got {source.dtype} {source.shape}; arrays of "
+                "numbers are for import_arrays"
+            )
         files = source
     elif pattern is None:
         picture = picture_of_views(Path(source), note)

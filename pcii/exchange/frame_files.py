@@ -183,6 +183,8 @@ def stacks_of(
     note: Note,
 ) -> np.ndarray:
     """The frames of each view, (K, L) of `FrameStack`, of a folder, an array, a file, or (K, L) of `Path`."""
+    if pattern is not None and table.axes is not None:
+        raise InputError("--axes: is for one array; of files of a view each the axes are T, H and W")
     if isinstance(source, np.ndarray) and isinstance(next(iter(source.flat), None), Path):
         paths = source
     elif pattern is None:
@@ -209,6 +211,8 @@ def _stacks_in_array(
     if isinstance(source, np.ndarray):
         name, numbers = "array", source
     elif kind_of(Path(source)) in VIEWS:
+        if table.axes is not None or key is not None:
+            raise InputError(f"--axes, --key: are for arrays, and {source} has a page for each view")
         name, numbers = str(source), decode(picture_of_views(Path(source), note))
         table = replace(table, axes="NHWC")
     else:
@@ -239,12 +243,14 @@ def _stacks_in_array(
 
 def _frames_of(stored: FrameFormat, key: str | None, path: Path) -> np.ndarray:
     """The frames (T, H, row[, 3]) of a view: pages of a picture, or a file that is mapped into memory."""
+    if stored.frame_size is None and kind_of(path) not in VIEWS:
+        numbers = open_array(path, key)
+        return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
+    if key is not None:
+        raise InputError(f"{path}: --key is for .npz, .mat and HDF5 files, and this is none")
     if stored.frame_size is not None:
         return stored.frames_in(path)
-    if kind_of(path) in VIEWS:
-        return _of_one_channel(decode(picture_of(path, EXACT)))
-    numbers = open_array(path, key)
-    return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
+    return _of_one_channel(decode(picture_of(path, EXACT)))
 
 
 def _of_one_channel(frames: np.ndarray) -> np.ndarray:

@@ -252,6 +252,22 @@ def test_the_axes_of_an_array_are_named(tmp_path: Path, axes: str) -> None:
     np.testing.assert_array_equal(views.radiance[..., 0], counts)
 
 
+def test_options_of_arrays_are_refused_where_there_is_none(tmp_path: Path) -> None:
+    pages = np.ones((4, H, W), np.uint16)
+    tifffile.imwrite(tmp_path / "0_0.tif", pages, photometric="minisblack")
+    pictures = {"source": tmp_path, "pattern": "{row}_{col}.tif"}
+    for options, words in (
+        ({"source": tmp_path / "0_0.tif", "axes": "NHW"}, "has a page for each view"),
+        ({"source": tmp_path / "0_0.tif", "key": "a"}, "has a page for each view"),
+        (pictures | {"axes": "THW"}, "--axes: is for one array"),
+        (pictures | {"key": "a"}, "0_0.tif: --key is for .npz, .mat and HDF5 files"),
+    ):
+        with pytest.raises(InputError, match=words):
+            imported_with_notes(**options)
+    with pytest.raises(InputError, match="of Path, got float64"):
+        pcii.import_images(np.ones((2, 2, H, W)), None, OPTICS)
+
+
 def test_a_picture_of_interlaced_views(tmp_path: Path, capsys: Any) -> None:
     views = np.random.default_rng(3).integers(0, 256, (2, 4, H, W, 3), np.uint8)
     picture = views.transpose(2, 0, 3, 1, 4).reshape(2 * H, 4 * W, 3)
