@@ -14,9 +14,8 @@ from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.elemental_images import import_images
 from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
 from pcii.exchange.number_files import open_array
-from pcii.exchange.posed_exports import MM_PER_M
 from pcii.exchange.stated_images import Encoding, Note, warn
-from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
+from pcii.exchange.transforms_file import MM_PER_M, MOST_PX, ROUNDING, TransformsFile, read_transforms
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 NEAREST_SHARE = 1 / 4
