@@ -14,9 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from pcii.base import InputError
-from pcii.exchange.elemental_images import files_by_camera, picture_of_views
 from pcii.exchange.number_files import EXACT, VIEWS, decode, kind_of, open_array, picture_of
-from pcii.exchange.stated_images import Note, ViewTable
+from pcii.exchange.stated_images import Note, ViewTable, files_by_camera, picture_of_views
 from pcii.types import whole_counts
 
 BitOrder = Literal["big", "little"]
@@ -190,8 +189,7 @@ def stacks_of(
     elif pattern is None:
         return _stacks_in_array(source, table, key, stored, note)
     else:
-        paths = files_by_camera(Path(str(source)), pattern, table.grid, table.order, note)
-    paths = table.order.arrange(paths)
+        paths = files_by_camera(Path(str(source)), pattern, table, note)
     stacks = np.empty(paths.shape[:2], object)
     for camera in np.ndindex(*stacks.shape):
         view = paths[camera]

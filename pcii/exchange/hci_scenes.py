@@ -23,9 +23,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pcii.base import InputError, Report, silent, visible
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
-from pcii.exchange.elemental_images import KnownViews, import_images, listed_names
-from pcii.exchange.number_files import decode, picture_of
-from pcii.exchange.stated_images import Encoding, Note, Optics, warn
+from pcii.exchange.elemental_images import Encoding, KnownViews, import_images
+from pcii.exchange.number_files import decode, listed_names, picture_of
+from pcii.exchange.stated_images import Note, Optics, warn
 from pcii.figures import to_srgb8
 from pcii.sections import demosaic
 from pcii.store import Dataset, first_fault

@@ -353,7 +353,16 @@ def _chosen(path: Path, key: str | None, shapes: dict[str, tuple[int, ...]]) -> 
         return wanted
     if not shapes:
         raise InputError(f"{path}: holds no array of numbers")
-    names = [f"{name} {times(shape)}" for name, shape in shapes.items()]
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    names = listed_names([f"{name} {times(shape)}" for name, shape in shapes.items()], most=MOST_NAMED)
     which = "say which with --key" if key is None else f"and no {visible(key)}; correct --key"
-    raise InputError(f"{path}: holds {visible(', '.join(names[:MOST_NAMED]))}{more}; {which}")
+    raise InputError(f"{path}: holds {names}; {which}")
+
+
+def listed_names(names: Sequence[str], most: int = 3) -> str:
+    """The first names of files, and how many more there are.
+
+    >>> listed_names(["a.png", "b.png", "c.png", "d.png", "e.png"])
+    'a.png, b.png, c.png and 2 more'
+    """
+    more = len(names) - most
+    return visible(", ".join(names[:most])) + (f" and {more} more" if more > 0 else "")

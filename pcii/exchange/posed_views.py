@@ -5,17 +5,16 @@ those of the pictures.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from pcii.base import InputError, Report, silent
 from pcii.exchange.count_arrays import import_counts
-from pcii.exchange.elemental_images import import_images
+from pcii.exchange.elemental_images import Encoding, import_images
 from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
 from pcii.exchange.number_files import open_array
-from pcii.exchange.stated_images import Encoding, Note, warn
-from pcii.exchange.transforms_file import MM_PER_M, MOST_PX, ROUNDING, TransformsFile, read_transforms
+from pcii.exchange.stated_images import Note, warn
+from pcii.exchange.transforms_file import MM_PER_M, MOST_PX, ROUNDING, TransformsFile
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 NEAREST_SHARE = 1 / 4
@@ -32,7 +31,7 @@ USUAL_PIXEL_MM = 0.005
 
 
 def import_posed_pictures(
-    source: str | Path,
+    file: TransformsFile,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -48,13 +47,12 @@ def import_posed_pictures(
     says how large the film is. For `encoding` and `cfa` see `import_images`. Raises `InputError`, naming file
     and member, frame or picture, for what is missing, wrong, or no such grid.
     """
-    file = read_transforms(source, note=note)
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
     return import_images(files, None, grid, encoding=encoding, cfa=cfa, report=report, note=note)
 
 
 def import_posed_cubes(
-    source: str | Path,
+    file: TransformsFile,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -72,7 +70,6 @@ def import_posed_cubes(
     and the last to add up; `cfa` is the Bayer pattern where the file has none. Raises `InputError`, naming
     the file, for cubes that differ from what it says.
     """
-    file = read_transforms(source, note=note)
     if file.cfa is not None and cfa not in (None, file.cfa):
         raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
