@@ -56,9 +56,7 @@ def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray
 def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
     """Parallax between the outermost cameras of the longer axis of the grid in px: (N - 1) d, without shear.
 
-    >>> grid = CameraGrid(
-    ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
-    ... )
+    >>> grid = CameraGrid(rows=1, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=4)
     >>> total_disparity_px(grid, np.array([500.0, 1000.0])).tolist()
     [20.0, 10.0]
     """
@@ -113,9 +111,7 @@ class FocalPlanes(ShortForm):
 
         Raises `InputError` for an invalid depth, and for planes of another grid.
 
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
-        ... )
+        >>> grid = CameraGrid(rows=1, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=4)
         >>> FocalPlanes.at_depths(grid, [500, 1000]).nearest_shifts_px()[1].tolist()
         [[-10, 0, 10], [-5, 0, 5]]
         """
