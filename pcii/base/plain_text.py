@@ -40,14 +40,11 @@ class ShortForm:
         return vars(self)
 
     def __repr__(self) -> str:
-        known = {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
-        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in known.items())
+        known = {name: fact for name, fact in self._facts().items() if fact is not None}
+        texts = {n: f"{fact:.4g}" if isinstance(fact, float) else str(fact) for n, fact in known.items()}
+        facts = ", ".join(f"{name}={visible(text)}" for name, text in texts.items())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
-
-
-def _figure(value: object) -> object:
-    return f"{value:.4g}" if isinstance(value, float) else value
 
 
 def times(shape: Sequence[int]) -> str:

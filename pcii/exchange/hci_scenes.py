@@ -16,7 +16,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -155,8 +155,8 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
     Raises `InputError` for a grid whose pitch or shear differs between the axes, or whose shear is negative.
     """
     grid = dataset.grid
-    baseline_mm = _of_both_axes(dataset, "pitch_mm", grid.pitch_mm)
-    shear_px = _of_both_axes(dataset, "shear_px", grid.shear_px)
+    baseline_mm = _of_both_axes(dataset, "pitch_mm")
+    shear_px = _of_both_axes(dataset, "shear_px")
     if shear_px < 0:
         raise InputError(
             f"{dataset.path}: shear_px: the HCI layout has a focus distance, and views sheared by "
@@ -191,9 +191,9 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
     )
 
 
-def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> float:
+def _of_both_axes(dataset: Dataset, name: Literal["pitch_mm", "shear_px"]) -> float:
     """The value that both axes have in common; that of an axis with one camera does not matter."""
-    grid = dataset.grid
+    grid, pair = dataset.grid, getattr(dataset.grid, name)
     values = [value for value, cameras in zip(pair, (grid.cols, grid.rows), strict=True) if cameras > 1]
     if len(values) == 2 and not math.isclose(*values, rel_tol=1e-9):
         raise InputError(
@@ -210,7 +210,11 @@ def _parameters(
     grid, recipe = dataset.grid, dataset.manifest.recipe
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
     lens = recipe.get("grid", {}).get("lens")
-    lowest, highest = _range_px(dataset, disparity_px)
+    depths_mm = dataset.analysis.get("z_range_mm") if dataset.truth is None else dataset.truth.z_mm
+    lowest = highest = math.nan
+    if depths_mm is not None:  # outwards to a tenth of a pixel
+        disparities = disparity_px(np.asarray(depths_mm))
+        lowest, highest = math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
     scene = re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name)
     # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down: turned by pi about X.
     return f"""[intrinsics]
@@ -248,18 +252,6 @@ frustum_disp_max = {highest}
 depth_map_scale = 1.0
 
 """
-
-
-def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
-    """Least and largest disparity, outwards to a tenth of a pixel: of the truth, else of the recipe's range.
-
-    NaN if nothing is known of the depths.
-    """
-    depths_mm = dataset.analysis.get("z_range_mm") if dataset.truth is None else dataset.truth.z_mm
-    if depths_mm is None:
-        return math.nan, math.nan
-    disparities = disparity_px(np.asarray(depths_mm))
-    return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
 
 
 def pictures_of(dataset: Dataset) -> tuple[Callable[[int, int], np.ndarray], dict[str, Any], str]:
