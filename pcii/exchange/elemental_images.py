@@ -124,11 +124,7 @@ def import_arrays(
             f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
             "--srgb, --linear or --gamma (encoding)"
         )
-    try:
-        radiance = _to_radiance(np.asarray(views), encoding)
-    except InputError as fault:
-        raise InputError(f"{name}: {fault}") from None
-    return _views_of(radiance, optics, cfa)
+    return _views_of(_to_radiance(name, np.asarray(views), encoding), optics, cfa)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,44 +150,40 @@ def _radiance_of(picture: Picture, encoding: Encoding | None) -> np.ndarray:
     """Linear radiance (pages, H, W, C), float32, of a picture."""
     if picture.dtype.name not in LIGHT_TYPES:
         raise InputError(f"{picture.path}: {picture.dtype} is no type of light; photon counts need --counts")
-    pixels = decode(picture)
-    try:
-        return _to_radiance(pixels, encoding, picture.most)
-    except InputError as fault:
-        raise InputError(f"{picture.path}: {fault}") from None
+    return _to_radiance(str(picture.path), decode(picture), encoding, picture.most)
 
 
-def _to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None = None) -> np.ndarray:
-    """Linear radiance, float32, of whole numbers (of 1 at `most`) or of floats.
+def _to_radiance(
+    name: str, numbers: np.ndarray, encoding: Encoding | None, most: int | None = None
+) -> np.ndarray:
+    """Linear radiance, float32, of whole numbers, of 1 at `most` (of their type), or of floats.
 
-    `most` is by default the largest number of the type. Without an encoding whole numbers are sRGB, as in
-    nearly all picture files, and floats are linear. Raises `InputError` for an encoding that is none, for
-    numbers that are NaN or infinite, for encoded ones below 0 or far above 1, and for light that is too
-    bright for float32.
+    Without an encoding whole numbers are sRGB, as in nearly all picture files, and floats are linear. Raises
+    `InputError`, naming the file `name`, for an encoding or numbers that cannot be.
 
-    >>> _to_radiance(np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
+    >>> _to_radiance("a.npy", np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
     [0.0, 0.216, 1.0]
-    >>> _to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
+    >>> _to_radiance("a.npy", np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
     [0.0, 0.502, 1.0]
     """
     is_whole = numbers.dtype.kind == "u"
     if encoding is None:
         encoding = "srgb" if is_whole else "linear"
-    elif encoding not in ("srgb", "linear") and not (
-        isinstance(encoding, int | float) and 0.1 <= encoding <= 10
-    ):
-        raise InputError(f"encoding: expected srgb, linear, or a gamma from 0.1 to 10, got {encoding!r}")
+    is_gamma = isinstance(encoding, int | float) and 0.1 <= encoding <= 10
+    if not is_gamma and encoding not in ("srgb", "linear"):
+        expected = "srgb, linear, or a gamma from 0.1 to 10"
+        raise InputError(f"{name}: encoding: expected {expected}, got {encoding!r}")
     full = most or (np.iinfo(numbers.dtype).max if is_whole else 1)
     if encoding == "srgb" and is_whole:  # few values are many pixels
         return srgb_to_linear(np.arange(full + 1) / full).astype(np.float32)[numbers]
     share = numbers / np.float32(full) if is_whole else numbers
     least, top = share.min(), share.max()
     if not np.isfinite([least, top]).all():
-        raise InputError("holds NaN or infinity; radiance is finite")
+        raise InputError(f"{name}: holds NaN or infinity; radiance is finite")
     if encoding != "linear" and not 0 <= least <= top <= LARGEST_ENCODED:
         raise InputError(
-            f"holds numbers from {least:g} to {top:g}; encoded light is from 0 to 1, which is white: divide "
-            "by the number of white"
+            f"{name}: holds numbers from {least:g} to {top:g}; encoded light is from 0 to 1, which is white: "
+            "divide by the number of white"
         )
     with np.errstate(over="ignore"):
         if encoding == "srgb":
@@ -200,7 +192,7 @@ def _to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | Non
             share = (share if is_whole else share.astype(np.float64)) ** encoding
         linear = share.astype(np.float32)
     if not np.isfinite(linear).all():
-        raise InputError("holds light that is too bright for float32")
+        raise InputError(f"{name}: holds light that is too bright for float32")
     return linear
 
 
