@@ -24,21 +24,6 @@ from pcii.types.truth import PhotonTruth
 Shifts = Literal["nearest", "even"]
 
 
-def project_px(
-    grid: CameraGrid, point_mm: tuple[float, float, float], k: float, l: float
-) -> tuple[float, float]:
-    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers.
-
-    The virtual centre is the camera ((K-1)/2, (L-1)/2).
-    """
-    X, Y, Z = point_mm
-    down, right = k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2
-    scale_px = grid.focal_mm / grid.pixel_mm / Z
-    i = (grid.height - 1) / 2 + down * grid.shear_px[1] + scale_px * (Y - down * grid.pitch_mm[1])
-    j = (grid.width - 1) / 2 + right * grid.shear_px[0] + scale_px * (X - right * grid.pitch_mm[0])
-    return i, j
-
-
 def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """(horizontal, vertical) disparity at depth z due to the camera pitch alone, in px per camera step."""
     # Lengths whose product no float64 holds give 0, infinity or NaN; `FocalPlanes` refuses the last two.
