@@ -13,7 +13,7 @@ from pcii.exchange.count_arrays import import_counts
 from pcii.exchange.elemental_images import Encoding, import_images
 from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
 from pcii.exchange.number_files import open_array
-from pcii.exchange.stated_images import Note, warn
+from pcii.exchange.stated_images import Note, Optics, warn
 from pcii.exchange.transforms_file import MM_PER_M, MOST_PX, ROUNDING, TransformsFile
 from pcii.types import CameraGrid, PhotonCounts, Views
 
@@ -41,11 +41,9 @@ def import_posed_pictures(
     report: Report = silent,
     note: Note = warn,
 ) -> Views:
-    """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
+    """Views and cameras of the pictures of a file, whose poses are of one plane grid of parallel cameras.
 
-    The file has the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
-    says how large the film is. For `encoding` and `cfa` see `import_images`. Raises `InputError`, naming file
-    and member, frame or picture, for what is missing, wrong, or no such grid.
+    The lengths of the film are as in `find_grid`, `encoding` and `cfa` as in `import_images`.
     """
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
     return import_images(files, None, grid, encoding=encoding, cfa=cfa, report=report, note=note)
@@ -63,7 +61,7 @@ def import_posed_cubes(
     report: Report = silent,
     note: Note = warn,
 ) -> PhotonCounts:
-    """Photon counts of the photon cubes that a transforms.json names, whose cameras are those of pictures.
+    """Photon counts of the photon cubes of a file, whose cameras are those of pictures.
 
     A cube is (T, H, W) or, if the file or `stored` says so, packed, uint8 (T, H, W / 8); an axis of one
     channel may follow, or of three of which `cfa` says the one that each pixel keeps. `frames` are the first
@@ -93,8 +91,9 @@ def find_grid(
     """The grid of the frames of a file, in whichever order they are, and the file of each camera, (K, L).
 
     Pitch and shear are fitted by least squares; an axis with one camera has the pitch of the other, a single
-    camera has 1 mm. One length of the film gives the others. Raises `InputError` for more than one, and for
-    cameras that are no such grid, with the frame that is off most.
+    camera has 1 mm. The file has the ratio of focal length and pixel size: one length of the film gives the
+    others. Raises `InputError` for more than one, and for cameras that are no such grid, with the frame that
+    is off most.
     """
     from scipy.spatial import KDTree
 
@@ -132,16 +131,9 @@ def find_grid(
             f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
             "below it, alike in all: sections and depth are in the frame of the pictures"
         )
-    grid = CameraGrid(
-        rows=int(rows),
-        cols=int(cols),
-        pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
-        focal_mm=focal_mm,
-        pixel_mm=pixel_mm,
-        height=file.height,
-        width=file.width,
-        shear_px=(_digits(slopes[3]), _digits(slopes[4])),
-    )
+    pitch_mm, shear_px = (_digits(pitch[0]), _digits(pitch[1])), (_digits(slopes[3]), _digits(slopes[4]))
+    optics = Optics(pitch_mm=pitch_mm, focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=shear_px)
+    grid = optics.grid((rows, cols, file.height, file.width))
     return grid, np.array(file.file_paths, object)[numbers]
 
 
