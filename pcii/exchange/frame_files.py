@@ -63,7 +63,7 @@ class FrameFormat:
             raise InputError(f"--bits: expected {most}, got {self.bits}")
         if self.bitpack and (self.offset is not None or self.gain is not None):
             raise InputError("--offset, --gain: are for numbers, and packed frames have bits")
-        if self.gain is not None and not self.gain > 0:
+        if self.gain is not None and not 0 < self.gain < np.inf:
             raise InputError(f"--gain: expected a number above 0, got {self.gain:g}")
         if self.bit_order not in (None, "big", "little"):
             raise InputError(f"--bit-order: expected big or little, got {self.bit_order!r}")
@@ -90,7 +90,7 @@ class FrameFormat:
         """Pixels in a row of `row` stored numbers; `InputError` if the stated width is another one."""
         if not self.bitpack:
             return row
-        width = self.width or (self.frame_size or (8 * row,))[0]
+        width = (self.frame_size or (8 * row,))[0] if self.width is None else self.width
         if -(-width // 8) != row:
             raise InputError(
                 f"{name}: its rows are of {8 * row - 7} to {8 * row} pixels, and the stated width is "

@@ -159,7 +159,11 @@ class ViewTable:
         if "N" in axes:
             table = self.order.table_of(name, numbers.shape[0], self.grid)
             numbers = numbers.reshape(*table, *numbers.shape[1:])
-        return self.order.arrange(numbers)
+        views = self.order.arrange(numbers)
+        if self.grid is not None and views.shape[:2] != tuple(self.grid):
+            sizes = times(views.shape[:2]), times(self.grid)
+            raise InputError(f"{name}: has {sizes[0]} views, and --grid states {sizes[1]}")
+        return views
 
 
 def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:

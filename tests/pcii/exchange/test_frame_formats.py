@@ -226,6 +226,7 @@ REFUSED = [
     ({"bits": 17}, "--bits: expected 1 to 16, got 17"),
     ({"bits": 2, "bitpack": True}, "--bits: expected 1 of packed frames, got 2"),
     ({"gain": 0.0}, "--gain: expected a number above 0, got 0"),
+    ({"gain": np.inf}, "--gain: expected a number above 0, got inf"),
     ({"offset": 3.0, "bitpack": True}, "--offset, --gain: are for numbers"),
     ({"frame_size": (0, 4)}, "--frame-size, --skip-bytes: expected at least one pixel"),
 ]
@@ -301,3 +302,5 @@ def test_frames_and_colours_have_axes_of_their_own_and_all_must_fit() -> None:
         for read in (import_counts, pcii.import_arrays):
             with pytest.raises(InputError, match=words):
                 read(np.ones(shape), OPTICS, axes=wrong)
+    with pytest.raises(InputError, match="array: has 2 x 3 views, and --grid states 3 x 2"):
+        import_counts(np.ones((H, W, 2, 3)), OPTICS, axes="HWKL", grid=(3, 2))
