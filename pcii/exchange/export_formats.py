@@ -241,11 +241,8 @@ def _depths_ahead_mm(dataset: Dataset) -> np.ndarray | None:
     """
     if not dataset.has_truth_array("view_z_mm"):
         return None
-    z_mm = dataset.truth_array("view_z_mm")
-    depths = z_mm.astype(np.float32)
-    if not dataset.has_truth_array("camera_position_mm"):
-        return depths
-    grid = dataset.grid
+    z_mm, grid = dataset.truth_array("view_z_mm"), dataset.grid
+    depths = np.empty(z_mm.shape, np.float32)
     position_mm, rotation = _true_cameras(dataset)
     axes = _principal_points_px(grid)
     for camera in np.ndindex(grid.rows, grid.cols):

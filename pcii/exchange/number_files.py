@@ -20,14 +20,11 @@ from pcii.base import InputError, times, visible
 LARGEST_BYTES = 1 << 33
 """Most memory of all pages of a TIFF file, and of the array of an HDF5 file: 8 GiB."""
 STARTS = {
-    b"\x89PNG\r\n\x1a\n": "PNG",
-    b"\xff\xd8\xff": "JPEG",
-    b"II*\0": "TIFF",
-    b"MM\0*": "TIFF",
-    b"II+\0": "TIFF",
-    b"MM\0+": "TIFF",
-    b"\x76\x2f\x31\x01": "EXR",
-    b"Pf": "PFM",
+    "PNG": b"\x89PNG\r\n\x1a\n",
+    "JPEG": b"\xff\xd8\xff",
+    "TIFF": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
+    "EXR": b"\x76\x2f\x31\x01",
+    "PFM": b"Pf",
 }
 GIT_LFS_START = b"version https://git-lfs"
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
@@ -101,7 +98,7 @@ class Picture:
 def kind_of(path: Path) -> str | None:
     """PNG, JPEG, TIFF, EXR or PFM, by the first bytes of a file; None for any other."""
     head = _head_of(path)
-    return next((kind for start, kind in STARTS.items() if head.startswith(start)), None)
+    return next((kind for kind, starts in STARTS.items() if head.startswith(starts)), None)
 
 
 def _head_of(path: Path) -> bytes:
