@@ -236,15 +236,15 @@ def import_dataset(
     K, L, H, W = dataset.grid.shape_KLHW
     sensor = f"{dataset.cfa} Bayer pattern" if dataset.cfa else "mono" if read.channel_count == 1 else "RGB"
     say("\n".join([f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}", *notes]))
-    # Cameras that the source states are not questioned. With wrong numbers, which a warning names, no order
-    # of views is right.
-    is_judged = "optics" in arguments and not any(note.startswith("warning:") for note in notes)
+    are_cameras_stated = "optics" not in arguments  # by the source; they are not questioned
+    # With wrong numbers, which a warning names, no order of views is right.
+    is_judged = not are_cameras_stated and not any(note.startswith("warning:") for note in notes)
     advice = _advice(fit, order, lenses, z_range_mm) if is_judged else None
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
     if not surfaces:
-        _say_depths(fit, is_counted=is_counted)
+        _say_depths(fit, is_counted=is_counted, are_cameras_stated=are_cameras_stated)
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
@@ -384,15 +384,16 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
     return None
 
 
-def _say_depths(fit: CameraFit, *, is_counted: bool) -> None:
+def _say_depths(fit: CameraFit, *, is_counted: bool, are_cameras_stated: bool) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
+    advice = "name depths to `pcii run` by --z-mm"
     if fit.z_mm:
         say(f"sharpest at {depths_text(fit.z_mm)} mm")
     elif fit.nearest_mm is None:
-        say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
+        say(f"too few views, pixels or photons to judge the cameras by; {advice}")
     else:
-        say(
-            f"nothing is clearly sharp from {depths_text([fit.nearest_mm])} mm to infinity; "
-            f"{'in little light --z-range-mm finds more; else ' if is_counted else ''}correct the order of "
-            "views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
-        )
+        if not are_cameras_stated:
+            advice = f"correct the order of views, --pitch-mm, --focal-mm or the size of pixels, or {advice}"
+        if is_counted:
+            advice = f"in little light --z-range-mm finds more; else {advice}"
+        say(f"nothing is clearly sharp from {depths_text([fit.nearest_mm])} mm to infinity; {advice}")

@@ -183,12 +183,12 @@ class FocalPlanes(ShortForm):
         return indices[0], indices[1]
 
     def project(
-        self, photons: PhotonEvents | PhotonTruth, plane: int, subpixel: int = 1
+        self, photons: PhotonEvents | PhotonTruth, plane: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Voxel row and column (N,) int64 of photons in the section at a plane, and whether inside, bool."""
-        rows, cols = (index[0] for index in self.take([plane]).voxel_indices(subpixel))
+        rows, cols = (index[0] for index in self.take([plane]).voxel_indices())
         row, col = rows[photons.k, photons.i].astype(np.int64), cols[photons.l, photons.j].astype(np.int64)
-        height, width = self.grid.height * subpixel, self.grid.width * subpixel
+        height, width = self.grid.shape_HW
         return row, col, (row >= 0) & (row < height) & (col >= 0) & (col < width)
 
 
