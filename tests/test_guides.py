@@ -21,7 +21,7 @@ from tiny import TINY_RECIPE
 import pcii
 import simgen
 from pcii.figures import write_png
-from pcii.store import Terms, copy_sample, write_card
+from pcii.store import SAMPLE, Terms, write_card
 from simgen.spec import Recipe, override
 
 DOCS = ROOT / "docs"
@@ -159,7 +159,7 @@ def case(name: str) -> object:
 def test_a_page_runs(name: str, tmp_path: Path, monkeypatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.chdir(tmp_path)
     if name != "first_hour.md":  # which begins in an empty folder
-        copy_sample(Path("out/sample"))
+        shutil.copytree(SAMPLE, "out/sample")
     if name in GIVEN:
         GIVEN[name](request)
     names = run_page(RUN[name])

@@ -1,5 +1,6 @@
 """The `pcii` command, and `pcii benchmark`."""
 
+import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,16 @@ from cyclopts import App, Parameter
 
 from pcii.app.import_commands import import_dataset
 from pcii.app.step_commands import STEPS, Out, SectionDepths, Workers
-from pcii.base import THIS_PROCESS, Stages, command_line, results_folder, say, say_next, say_next_page
+from pcii.base import (
+    THIS_PROCESS,
+    Stages,
+    command_line,
+    new_folder_safely,
+    results_folder,
+    say,
+    say_next,
+    say_next_page,
+)
 from pcii.evaluation import (
     Evaluation,
     comparison,
@@ -18,7 +28,7 @@ from pcii.evaluation import (
     write_page,
 )
 from pcii.exchange import export
-from pcii.store import Half, copy_sample, print_verification
+from pcii.store import SAMPLE, Half, check_free, print_verification
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
@@ -56,7 +66,10 @@ def sample(*, out: Out) -> None:
     out
         Folder for the dataset: new or empty.
     """
-    copy_sample(out)
+    check_free(out, "dataset")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder_safely(out) as folder:
+        shutil.copytree(SAMPLE, folder, dirs_exist_ok=True)
     say(f"{out}")
     say_next("pcii", "run", out, "-o", results_folder(out))
 

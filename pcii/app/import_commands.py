@@ -19,6 +19,7 @@ from pcii.base import InputError, Stages, results_folder, say, say_next
 from pcii.evidence import CameraFit, check_grid, without_hot_pixels
 from pcii.exchange import (
     AS_COUNTED,
+    AS_STORED,
     NO_DEPTH,
     PARAMETERS,
     TRANSFORMS,
@@ -30,6 +31,7 @@ from pcii.exchange import (
     LensArray,
     Note,
     Optics,
+    TransformsFile,
     ViewOrder,
     import_arrays,
     import_counts,
@@ -111,7 +113,7 @@ READERS: dict[Callable[..., Any], tuple[str, tuple[str, ...]]] = {
 }
 """What a reader reads, and the flags that it meets by its nature."""
 FLAT = Parameter(name="*")
-CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
+CAMERAS, LENSES, LIGHT = Cameras(), Lenses(), PictureLight()
 
 
 def import_dataset(
@@ -126,7 +128,7 @@ def import_dataset(
     frames: WholePair = None,
     stored: Annotated[FrameFormat, FLAT] = AS_COUNTED,
     cameras: Annotated[Cameras, FLAT] = CAMERAS,
-    order: Annotated[ViewOrder, FLAT] = ORDER,
+    order: Annotated[ViewOrder, FLAT] = AS_STORED,
     lenses: Annotated[Lenses, FLAT] = LENSES,
     light: Annotated[PictureLight, FLAT] = LIGHT,
     cfa: str | None = None,
@@ -197,62 +199,62 @@ def import_dataset(
     check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
-        reader = _choose_reader(source, options)
-        listeners = {"report": report, "note": notes.append}
-        arguments = _arguments(reader, source, options, groups, listeners)
-        result = reader(source, **arguments)
-        known = result if isinstance(result, KnownViews) else None
-        read = result.views if isinstance(result, KnownViews) else result
+        reader, content = _choose_reader(source, options, notes.append)
+        arguments = _arguments(reader, source, options, groups, {"report": report, "note": notes.append})
+        read, truth = reader(content, **arguments), None
+        if isinstance(read, KnownViews):
+            read, truth, z_range_mm = read.views, read.truth, z_range_mm or read.z_range_mm
+        truth = true_depth.truth_for(read.grid, notes.append) or truth
         images: list[Views | PhotonCounts] = [read]
+        is_counted = isinstance(read, PhotonCounts)
         origin = f"{READERS[reader][0]} of {source.resolve().name}"
         if arguments.get("encoding"):
             origin += f", decoded by {arguments['encoding']}"
-        if isinstance(read, PhotonCounts) and (read.readout.frames or 0) > 1:
+        if is_counted and read.readout.frames > 1:
             origin += f", {read.readout.frames} frames"
         if photons is not None:
-            if isinstance(read, PhotonCounts):
+            if is_counted:
                 raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
             images.append(limit_photons(read, photons, seed=seed or 1))
             origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
-        z_range = z_range_mm or (known and known.z_range_mm)
-        truth = true_depth.truth_for(read.grid, notes.append) or (known and known.truth)
-        fit = check_grid(_without_hot_pixels(read, notes.append), z_range, order=order)
+        fit = check_grid(_without_hot_pixels(read, notes.append), z_range_mm, order=order)
         surfaces: tuple[float, ...] = ()
-        is_counted = isinstance(read, PhotonCounts)
-        if is_counted and not z_mm and z_range is not None and read.grid.view_count > 1:
+        if is_counted and not z_mm and z_range_mm is not None and read.grid.view_count > 1:
             # In the noise of few photons contrast is no sure sign.
-            surfaces, sentence = surface_depths(read, z_range)
+            surfaces, sentence = surface_depths(read, z_range_mm)
             notes += [sentence] * bool(surfaces)
         dataset = save_dataset(
             out,
             images,
             truth,
             z_mm=z_mm or [float(f"{z:.3g}") for z in surfaces or fit.z_mm] or None,
-            z_range_mm=z_range,
+            z_range_mm=z_range_mm,
             photon_budget=photons,
             title=source.resolve().name,
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
-    channels = read.channel_count if isinstance(read, Views) else 1
-    sensor = f"{dataset.cfa} Bayer pattern" if dataset.cfa else "mono" if channels == 1 else "RGB"
-    say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
-    for note in notes:
-        say(note)
-    # Cameras that the source states are not questioned. With wrong numbers, which a warning names, no order
-    # of views is right.
-    is_judged = "optics" in arguments and not any(note.startswith("warning:") for note in notes)
-    advice = _advice(fit, order, lenses, z_range) if is_judged else None
+    sensor = f"{dataset.cfa} Bayer pattern" if dataset.cfa else "mono" if read.channel_count == 1 else "RGB"
+    say("\n".join([f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}", *notes]))
+    are_cameras_stated = "optics" not in arguments  # by the source; they are not questioned
+    # With wrong numbers, which a warning names, no order of views is right.
+    is_judged = not are_cameras_stated and not any(note.startswith("warning:") for note in notes)
+    advice = _advice(fit, order, lenses, z_range_mm) if is_judged else None
     if advice is not None:
         say(f"warning: {advice}; then delete {out} and import again")
         return
     if not surfaces:
-        _say_depths(fit, is_counted=is_counted)
+        _say_depths(fit, is_counted=is_counted, are_cameras_stated=are_cameras_stated)
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Any]:
-    """The reader of a source; `InputError` for a source that is not there, or a folder without a pattern."""
+def _choose_reader(
+    source: Path, options: Mapping[str, Any], note: Note
+) -> tuple[Callable[..., Any], Path | TransformsFile]:
+    """The reader of a source, and what it reads: the source, or what its transforms.json says.
+
+    Raises `InputError` for a source that is not there, and for a folder without a pattern.
+    """
     if not source.exists():
         raise InputError(f"{source}: there is no such file or folder")
     pattern, is_folder = options["pattern"], source.is_dir()
@@ -261,13 +263,13 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
             raise InputError(
                 f"{source}: is a folder; --lens-array is for one picture, which holds all lens images"
             )
-        return import_lens_array
+        return import_lens_array, source
     if pattern is None:
         if (source.suffix == ".json" and not is_folder) or (source / TRANSFORMS).is_file():
-            has_cubes = read_transforms(source, note=lambda sentence: None).has_cubes
-            return import_posed_cubes if has_cubes else import_posed_pictures
+            file = read_transforms(source, note=note)
+            return import_posed_cubes if file.has_cubes else import_posed_pictures, file
         if (source / PARAMETERS).is_file():
-            return import_hci
+            return import_hci, source
         if any((source / name).is_file() for name in COLMAP_FILES):
             raise InputError(
                 f"{source}: is a model of COLMAP; if its cameras are of one plane grid, make it a "
@@ -279,10 +281,10 @@ def _choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., An
                 f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"'
             )
     if options["interlaced"] is not None:
-        return import_interlaced
+        return import_interlaced, source
     if any(options[name] for name in ("counts", "bits", "bitpack", "frame_size")):
-        return import_counts
-    return import_images if pattern is not None or kind_of(source) in VIEWS else import_arrays
+        return import_counts, source
+    return import_images if pattern is not None or kind_of(source) in VIEWS else import_arrays, source
 
 
 def _arguments(
@@ -328,10 +330,8 @@ def _lens_array(options: Mapping[str, Any]) -> LensArray:
     if options["lens_pitch_px"] is None:
         raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
     rows, cols = options["lens_array"]
-    offset_px, inverted = options["lens_offset_px"] or (0.0, 0.0), options["inverted"]
-    return LensArray(
-        rows=rows, cols=cols, pitch_px=options["lens_pitch_px"], offset_px=offset_px, inverted=inverted
-    )
+    places = {"pitch_px": options["lens_pitch_px"], "offset_px": options["lens_offset_px"] or (0.0, 0.0)}
+    return LensArray(rows=rows, cols=cols, inverted=options["inverted"], **places)
 
 
 def _encoding(options: Mapping[str, Any]) -> Encoding | None:
@@ -384,15 +384,16 @@ def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses, z_range: Pair) -> 
     return None
 
 
-def _say_depths(fit: CameraFit, *, is_counted: bool) -> None:
+def _say_depths(fit: CameraFit, *, is_counted: bool, are_cameras_stated: bool) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
+    advice = "name depths to `pcii run` by --z-mm"
     if fit.z_mm:
         say(f"sharpest at {depths_text(fit.z_mm)} mm")
     elif fit.nearest_mm is None:
-        say("too few views, pixels or photons to judge the cameras by; name depths to `pcii run` by --z-mm")
+        say(f"too few views, pixels or photons to judge the cameras by; {advice}")
     else:
-        say(
-            f"nothing is clearly sharp from {depths_text([fit.nearest_mm])} mm to infinity; "
-            f"{'in little light --z-range-mm finds more; else ' if is_counted else ''}correct the order of "
-            "views, --pitch-mm, --focal-mm or the size of pixels, or name depths to `pcii run` by --z-mm"
-        )
+        if not are_cameras_stated:
+            advice = f"correct the order of views, --pitch-mm, --focal-mm or the size of pixels, or {advice}"
+        if is_counted:
+            advice = f"in little light --z-range-mm finds more; else {advice}"
+        say(f"nothing is clearly sharp from {depths_text([fit.nearest_mm])} mm to infinity; {advice}")

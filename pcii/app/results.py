@@ -13,7 +13,7 @@ New results are written completely into a temporary folder, which then takes the
 
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,11 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
     target = out.resolve()
     if target == dataset.path.resolve():
         raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-    with _only_writer(target, out), named_in_errors(out):
+    lock = target.with_name(f".{target.name}.lock")
+    with locked(lock, out), named_in_errors(out), ExitStack() as at_end:
+        at_end.callback(lock.unlink, missing_ok=True)
+        for folder in temporaries_of(target.parent, target.name):  # of a command that was killed
+            shutil.rmtree(folder, ignore_errors=True)
         files, versions = _results_of(out, dataset)
         if files and (extra := unlisted_files(target, [RESULTS, *files])):
             raise InputError(f"{out}: holds {extra[0]}, which is no result; move it away")
@@ -106,18 +110,6 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
                 "files": dict(sorted((files | list_files(folder, new_parts)).items())),
             }
             RESULTS_FOLDER.write(folder, content)
-
-
-@contextmanager
-def _only_writer(target: Path, out: Path) -> Iterator[None]:
-    lock = target.with_name(f".{target.name}.lock")
-    with locked(lock, out):
-        try:
-            for folder in temporaries_of(target.parent, target.name):  # of a command that was killed
-                shutil.rmtree(folder, ignore_errors=True)
-            yield
-        finally:
-            lock.unlink(missing_ok=True)
 
 
 def _origin(dataset: Dataset) -> dict[str, Any]:

@@ -274,8 +274,7 @@ def score(dataset: DatasetFolder, out: Path) -> None:
     focus, depth_map = results.load_estimates(out, data)
     if difference := differences(manifest.versions, own_software()):
         say(f"{out}: other software made these results: {difference}")
-    planes = planes_of(data) if has_depths(data) else None
-    planes = focus[0].sections.planes if focus else planes
+    planes = focus[0].sections.planes if focus else planes_of(data) if has_depths(data) else None
     with results.writing(out, data) as folder:
         views = data.views if data.truth and planes else None
         full_light = reconstruct_sections(views, planes) if views and planes else None

@@ -14,7 +14,7 @@ from .pixel_arithmetic import LUMINANCE as LUMINANCE, on_pixels as on_pixels, sr
 from .pixel_arithmetic import sum_of as sum_of, window_sums as window_sums
 from .plain_text import in_markdown as in_markdown, InputError as InputError, is_plain as is_plain
 from .plain_text import listed as listed, ShortForm as ShortForm, span as span, times as times
-from .plain_text import visible as visible, web_address as web_address, WorkerLostError as WorkerLostError
+from .plain_text import visible as visible, WorkerLostError as WorkerLostError
 from .safe_files import json_bytes as json_bytes, locked as locked, named_in_errors as named_in_errors
 from .safe_files import new_folder_safely as new_folder_safely, sweep_temporaries as sweep_temporaries
 from .safe_files import temporaries_of as temporaries_of, write_bytes_safely as write_bytes_safely

@@ -96,9 +96,8 @@ class Stages(AbstractContextManager["Stages"]):
         self._lock = threading.Lock()  # steps of one analysis report from two threads
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
-        self._begun: dict[str, float] = {}
-        self._done: dict[str, int] = {}
-        self._logged: dict[str, float] = {}
+        self._stages: dict[str, tuple[int, float, float]] = {}
+        """What of each stage is done, when it began, and when a line on it was last written."""
 
     def __enter__(self) -> "Stages":
         if sys.stderr.isatty():
@@ -126,21 +125,22 @@ class Stages(AbstractContextManager["Stages"]):
             self._show(visible(stage), done, total)
 
     def _show(self, stage: str, done: int, total: int) -> None:
-        is_anew, self._done[stage] = done < self._done.get(stage, 0), done
+        now = time.monotonic()
+        last_done, begun, logged = self._stages.get(stage, (0, now, now))
+        if is_anew := done < last_done:
+            begun = logged = now
         if self._bars is not None:
             if stage not in self._tasks:
                 self._tasks[stage] = self._bars.add_task(stage, total=total)
             if is_anew:
                 self._bars.reset(self._tasks[stage])
             self._bars.update(self._tasks[stage], completed=done, total=total)
-            return
-        now = time.monotonic()
-        begun = self._begun[stage] = now if is_anew else self._begun.get(stage, now)
-        if done == total or now - max(begun, self._logged.get(stage, begun)) >= LOG_EVERY_S:
-            self._logged[stage] = now
+        elif done == total or now - logged >= LOG_EVERY_S:
+            logged = now
             left_s = (total - done) * (now - begun) / max(done, 1)
             left = f", {left_s:.0f} s left" if 0 < done < total else ""
             print(f"{stage}: {done}/{total}, {now - begun:.1f} s{left}", file=sys.stderr, flush=True)
+        self._stages[stage] = done, begun, logged
 
 
 # Commands

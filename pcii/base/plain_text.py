@@ -4,7 +4,6 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from html import escape
-from urllib.parse import quote
 
 import numpy as np
 
@@ -16,8 +15,6 @@ BLANK = re.compile("[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\ufe00-\uf
 """Letters, marks and symbols of Unicode that are drawn as nothing, or choose how the one before is drawn."""
 MARKDOWN = re.compile(r"[\\`*\[\]|~$#]|(?<![^\W_])_|_(?![^\W_])")
 """Characters with a meaning in Markdown; an underscore has one only at the ends of words."""
-OF_ADDRESSES = "%/:?#[]@!$&'()*+,;=~"
-"""What addresses of the web hold beside letters, digits and - . _ as it is."""
 MAX_LINE_LENGTH = 119
 MAX_LISTED = 4
 """Longer lists are abbreviated to their first and last value and their length."""
@@ -43,14 +40,11 @@ class ShortForm:
         return vars(self)
 
     def __repr__(self) -> str:
-        known = {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
-        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in known.items())
+        known = {name: fact for name, fact in self._facts().items() if fact is not None}
+        texts = {n: f"{fact:.4g}" if isinstance(fact, float) else str(fact) for n, fact in known.items()}
+        facts = ", ".join(f"{name}={visible(text)}" for name, text in texts.items())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
-
-
-def _figure(value: object) -> object:
-    return f"{value:.4g}" if isinstance(value, float) else value
 
 
 def times(shape: Sequence[int]) -> str:
@@ -101,14 +95,3 @@ def in_markdown(text: str) -> str:
     a\\|b, snake_case, \\*c\\*
     """
     return MARKDOWN.sub(r"\\\g<0>", escape(visible(text), quote=False))
-
-
-def web_address(text: str) -> str:
-    """An address of the web as a link takes it, other characters percent-encoded; "" for any other text.
-
-    >>> web_address("https://example.org/a b"), web_address("javascript://x")
-    ('https://example.org/a%20b', '')
-    """
-    if not re.match("https?://", text, re.IGNORECASE):
-        return ""
-    return quote(text, safe=OF_ADDRESSES, errors="backslashreplace")

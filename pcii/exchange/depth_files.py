@@ -58,7 +58,9 @@ class DepthFile:
             is_unknown |= numbers == np.iinfo(numbers.dtype).max
         z_mm = numbers.astype(np.float64) * self.depth_unit_mm
         if self.depth_along_ray:
-            z_mm /= _ray_lengths(grid)
+            rows, cols = (np.arange(size) - (size - 1) / 2 for size in grid.shape_HW)
+            # Length of the ray of each pixel of the virtual centre to the plane at depth 1.
+            z_mm /= np.hypot(np.hypot(rows[:, None], cols) * grid.pixel_mm / grid.focal_mm, 1.0)
         z_mm[is_unknown | (z_mm >= FARTHEST_MM)] = np.inf
         if is_unknown.all() or not (z_mm >= NEAREST_MM).all():
             least = f"{z_mm.min():.3g} mm" if not is_unknown.all() else "no known depth"
@@ -123,9 +125,3 @@ def _depth_channel(path: Path) -> np.ndarray | None:
             if name.split(".")[-1].upper() == end:
                 return pixels
     return None
-
-
-def _ray_lengths(grid: CameraGrid) -> np.ndarray:
-    """Length (H, W) of the ray of each pixel of the virtual centre to the plane at depth 1."""
-    rows, cols = (np.arange(n) - (n - 1) / 2 for n in grid.shape_HW)
-    return np.hypot(np.hypot(rows[:, None], cols) * grid.pixel_mm / grid.focal_mm, 1.0)

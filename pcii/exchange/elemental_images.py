@@ -1,37 +1,32 @@
-"""Elemental images from pictures and arrays: a file a view, a page a view, a picture of a lens array.
-
-A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text. Of
-photon counts {frame} too, if each file holds one frame.
-"""
+"""Elemental images from pictures and arrays: a file a view, a page a view, a picture of a lens array."""
 
 import math
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
-from pathlib import Path, PurePosixPath
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from pcii.base import InputError, Report, silent, times, visible
-from pcii.exchange.number_files import VIEWS, Picture, decode, open_array, picture_of
+from pcii.base import InputError, Report, silent, srgb_to_linear, times
+from pcii.exchange.number_files import VIEWS, Picture, decode, listed_names, open_array, picture_of
 from pcii.exchange.stated_images import (
     AS_STORED,
-    Encoding,
     Note,
     Optics,
     ViewOrder,
     ViewTable,
-    to_radiance,
+    files_by_camera,
+    picture_of_views,
     warn,
 )
 from pcii.types import CameraGrid, Truth, Views, mosaic
 
-FIELD = re.compile(r"\{(row|col|index|frame)(?::(?:0[1-9])?d?)?\}")
 LIGHT_TYPES = ("uint8", "uint16", "float16", "float32", "float64")
-MOST_VIEWS = 100_000
-MOST_NAMED = 3
-"""Largest number of files that a sentence names."""
+Encoding = Literal["srgb", "linear"] | float
+"""How numbers stand for light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
+LARGEST_ENCODED = 2.0
+"""Largest encoded float that is taken: white is 1, and sharpened pictures exceed it a little. Numbers of 8
+bits or more, which are refused, reach far more: any limit from 1.5 to 100 decides alike."""
 
 
 def import_images(
@@ -57,13 +52,17 @@ def import_images(
     pictures. Raises `InputError`, naming a file, for what does not fit.
     """
     if isinstance(source, np.ndarray):
+        if not all(isinstance(path, Path) for path in source.flat):
+            raise InputError(
+                f"source: expected an array (K, L) of Path, got {source.dtype} {source.shape}; arrays of "
+                "numbers are for import_arrays"
+            )
         files = source
     elif pattern is None:
-        picture = picture_of_views(Path(source), note)
-        pages = ViewTable(grid=grid, order=order, axes="NHWC")
+        picture, pages = picture_of_views(Path(source), note), ViewTable(grid=grid, order=order, axes="NHWC")
         return _views_of(pages.by_camera(_radiance_of(picture, encoding), str(source)), optics, cfa)
     else:
-        files = order.arrange(files_by_camera(Path(source), pattern, grid, order, note))
+        files = files_by_camera(Path(source), pattern, ViewTable(grid=grid, order=order), note)
     if files.ndim > 2:
         raise InputError("pattern: {frame} is for frames of photon counts; give --counts too")
     radiance, first = np.empty(0), None
@@ -125,11 +124,7 @@ def import_arrays(
             f"{name}: {views.dtype} may be sRGB of pictures or linear values of a sensor; say which, with "
             "--srgb, --linear or --gamma (encoding)"
         )
-    try:
-        radiance = to_radiance(np.asarray(views), encoding)
-    except InputError as fault:
-        raise InputError(f"{name}: {fault}") from None
-    return _views_of(radiance, optics, cfa)
+    return _views_of(_to_radiance(name, np.asarray(views), encoding), optics, cfa)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,115 +150,50 @@ def _radiance_of(picture: Picture, encoding: Encoding | None) -> np.ndarray:
     """Linear radiance (pages, H, W, C), float32, of a picture."""
     if picture.dtype.name not in LIGHT_TYPES:
         raise InputError(f"{picture.path}: {picture.dtype} is no type of light; photon counts need --counts")
-    pixels = decode(picture)
-    try:
-        return to_radiance(pixels, encoding, picture.most)
-    except InputError as fault:
-        raise InputError(f"{picture.path}: {fault}") from None
+    return _to_radiance(str(picture.path), decode(picture), encoding, picture.most)
 
 
-def picture_of_views(path: Path, note: Note, *, has_pages: bool = True) -> Picture:
-    """A picture of all views: with a page for each, or a single one of a lens array.
-
-    `note` takes what else is in the file. Raises `InputError` for the other kind.
-    """
-    picture = picture_of(path, VIEWS)
-    if has_pages and picture.pages == 1:
-        raise InputError(
-            f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
-            "folder and --pattern"
-        )
-    if picture.pages > 1 and not has_pages:
-        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
-    if picture.unused:
-        note(f"not used: {picture.unused} in {path.name}")
-    return picture
-
-
-def listed_names(names: Sequence[str]) -> str:
-    """The first names of files, and how many more there are.
-
-    >>> listed_names(["a.png", "b.png", "c.png", "d.png", "e.png"])
-    'a.png, b.png, c.png and 2 more'
-    """
-    more = len(names) - MOST_NAMED
-    return visible(", ".join(names[:MOST_NAMED])) + (f" and {more} more" if more > 0 else "")
-
-
-def files_by_camera(
-    folder: Path, pattern: str, grid: tuple[int, int] | None, order: ViewOrder, note: Note
+def _to_radiance(
+    name: str, numbers: np.ndarray, encoding: Encoding | None, most: int | None = None
 ) -> np.ndarray:
-    """Paths (A, B) of the files in `folder` that fit the pattern, in the order of their numbers.
+    """Linear radiance, float32, of whole numbers, of 1 at `most` (of their type), or of floats.
 
-    With {frame} they are (A, B, T), those of the frames of each view. Axes are {row} and {col}; the numbers
-    of {index} count along the table in which the `order` stores a `grid`. Numbers may begin anywhere and have
-    a sign; endings in capitals fit too. Raises `InputError` for a pattern that is none, for files that are
-    missing and for two of one view; `note` takes the names of other files.
+    Without an encoding whole numbers are sRGB, as in nearly all picture files, and floats are linear. Raises
+    `InputError`, naming the file `name`, for an encoding or numbers that cannot be.
+
+    >>> _to_radiance("a.npy", np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
+    [0.0, 0.216, 1.0]
+    >>> _to_radiance("a.npy", np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
+    [0.0, 0.502, 1.0]
     """
-    expression, fields = _expression(pattern)
-    names = [name for name in fields if name != "frame"]
-    if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder; --pattern names the files of a folder")
-    files: dict[tuple[int, ...], Path] = {}
-    others: list[str] = []
-    for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
-        if not path.is_file() or path.name.startswith("."):
-            continue
-        name = path.relative_to(folder).as_posix()
-        match = expression.fullmatch(name)
-        if match is None:
-            others.append(name)
-            continue
-        place = tuple(int(match[field]) for field in fields)
-        if place in files:
-            raise InputError(f"{path}: is of the same view as {files[place].name}")
-        files[place] = path
-    if not files:
-        hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
-        raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
-    if others:
-        note(f"not used: {listed_names(others)}, since --pattern does not fit")
-    numbers: list[Sequence[int]] = [sorted({*column}) for column in zip(*files, strict=True)]
-    for axis in range(len(names)):  # whereas numbers of frames may have gaps
-        numbers[axis] = range(numbers[axis][0], numbers[axis][-1] + 1)
-    if names == ["index"] and grid is not None:  # the last views may be missing
-        first, end = numbers[0][0], numbers[0][-1] + 1
-        numbers[0] = range(first, max(end, first + math.prod(grid)))
-    if math.prod(axis[-1] - axis[0] + 1 for axis in numbers[: len(names)]) > MOST_VIEWS:
-        ends = " and ".join(f"{name} {r[0]} to {r[-1]}" for name, r in zip(names, numbers, strict=False))
-        raise InputError(f"{folder}: {ends} are too far apart for a grid of at most {MOST_VIEWS} views")
-    if names == ["index"]:
-        table = order.table_of(folder, len(numbers[0]), grid)
-    else:
-        table = len(numbers[0]), len(numbers[1])
-        if grid is not None and table != (grid[::-1] if order.swap_axes else grid):
-            raise InputError(
-                f"{folder}: {pattern} gives {table[0]} rows and {table[1]} columns, not those of --grid"
-            )
-    missing = [place for place in product(*numbers) if place not in files]
-    if missing:
-        first = ", ".join(f"{name} {number}" for name, number in zip(fields, missing[0], strict=True))
-        size = times([*map(len, numbers)])
-        raise InputError(f"{folder}: {len(missing)} of {size} files missing, first {first}")
-    return np.array([files[place] for place in sorted(files)], object).reshape(
-        *table, *map(len, numbers[len(names) :])
-    )
-
-
-def _expression(pattern: str) -> tuple[re.Pattern[str], list[str]]:
-    """The regular expression of file names, and the numbers in them: row and col, or index; maybe frame."""
-    fields = sorted(FIELD.findall(pattern), key=("row", "col", "index", "frame").index)
-    names = [name for name in fields if name != "frame"]
-    is_known = names in (["index"], ["row", "col"]) and fields.count("frame") < 2
-    if not is_known or {*FIELD.sub("", pattern)} & {*"{}"}:
+    is_whole = numbers.dtype.kind == "u"
+    if encoding is None:
+        encoding = "srgb" if is_whole else "linear"
+    is_gamma = isinstance(encoding, int | float) and 0.1 <= encoding <= 10
+    if not is_gamma and encoding not in ("srgb", "linear"):
+        expected = "srgb, linear, or a gamma from 0.1 to 10"
+        raise InputError(f"{name}: encoding: expected {expected}, got {encoding!r}")
+    full = most or (np.iinfo(numbers.dtype).max if is_whole else 1)
+    if encoding == "srgb" and is_whole:  # few values are many pixels
+        return srgb_to_linear(np.arange(full + 1) / full).astype(np.float32)[numbers]
+    share = numbers / np.float32(full) if is_whole else numbers
+    least, top = share.min(), share.max()
+    if not np.isfinite([least, top]).all():
+        raise InputError(f"{name}: holds NaN or infinity; radiance is finite")
+    if encoding != "linear" and not 0 <= least <= top <= LARGEST_ENCODED:
         raise InputError(
-            f'pattern: expected {{row}} and {{col}}, or {{index}}, as in "{{col}}_{{row}}.png" or '
-            f'"view{{index:03d}}_*.png"; got {pattern!r}'
+            f"{name}: holds numbers from {least:g} to {top:g}; encoded light is from 0 to 1, which is white: "
+            "divide by the number of white"
         )
-    escaped = re.escape(pattern).replace(r"\*", "[^/]*")
-    number = r"(?P<\1>[+-]?[0-9]+)"
-    expression = re.compile(re.sub(r"\\\{([a-z]+).*?\\\}", number, escaped), re.IGNORECASE)
-    return expression, fields
+    with np.errstate(over="ignore"):
+        if encoding == "srgb":
+            share = srgb_to_linear(share)
+        elif encoding != "linear":
+            share = (share if is_whole else share.astype(np.float64)) ** encoding
+        linear = share.astype(np.float32)
+    if not np.isfinite(linear).all():
+        raise InputError(f"{name}: holds light that is too bright for float32")
+    return linear
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,9 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from pcii.base import InputError
-from pcii.exchange.elemental_images import files_by_camera, picture_of_views
 from pcii.exchange.number_files import EXACT, VIEWS, decode, kind_of, open_array, picture_of
-from pcii.exchange.stated_images import Note, ViewTable
+from pcii.exchange.stated_images import Note, ViewTable, files_by_camera, picture_of_views
 from pcii.types import whole_counts
 
 BitOrder = Literal["big", "little"]
@@ -64,7 +63,7 @@ class FrameFormat:
             raise InputError(f"--bits: expected {most}, got {self.bits}")
         if self.bitpack and (self.offset is not None or self.gain is not None):
             raise InputError("--offset, --gain: are for numbers, and packed frames have bits")
-        if self.gain is not None and not self.gain > 0:
+        if self.gain is not None and not 0 < self.gain < np.inf:
             raise InputError(f"--gain: expected a number above 0, got {self.gain:g}")
         if self.bit_order not in (None, "big", "little"):
             raise InputError(f"--bit-order: expected big or little, got {self.bit_order!r}")
@@ -91,7 +90,7 @@ class FrameFormat:
         """Pixels in a row of `row` stored numbers; `InputError` if the stated width is another one."""
         if not self.bitpack:
             return row
-        width = self.width or (self.frame_size or (8 * row,))[0]
+        width = (self.frame_size or (8 * row,))[0] if self.width is None else self.width
         if -(-width // 8) != row:
             raise InputError(
                 f"{name}: its rows are of {8 * row - 7} to {8 * row} pixels, and the stated width is "
@@ -183,13 +182,14 @@ def stacks_of(
     note: Note,
 ) -> np.ndarray:
     """The frames of each view, (K, L) of `FrameStack`, of a folder, an array, a file, or (K, L) of `Path`."""
+    if pattern is not None and table.axes is not None:
+        raise InputError("--axes: is for one array; of files of a view each the axes are T, H and W")
     if isinstance(source, np.ndarray) and isinstance(next(iter(source.flat), None), Path):
         paths = source
     elif pattern is None:
         return _stacks_in_array(source, table, key, stored, note)
     else:
-        paths = files_by_camera(Path(str(source)), pattern, table.grid, table.order, note)
-    paths = table.order.arrange(paths)
+        paths = files_by_camera(Path(str(source)), pattern, table, note)
     stacks = np.empty(paths.shape[:2], object)
     for camera in np.ndindex(*stacks.shape):
         view = paths[camera]
@@ -209,6 +209,8 @@ def _stacks_in_array(
     if isinstance(source, np.ndarray):
         name, numbers = "array", source
     elif kind_of(Path(source)) in VIEWS:
+        if table.axes is not None or key is not None:
+            raise InputError(f"--axes, --key: are for arrays, and {source} has a page for each view")
         name, numbers = str(source), decode(picture_of_views(Path(source), note))
         table = replace(table, axes="NHWC")
     else:
@@ -239,12 +241,14 @@ def _stacks_in_array(
 
 def _frames_of(stored: FrameFormat, key: str | None, path: Path) -> np.ndarray:
     """The frames (T, H, row[, 3]) of a view: pages of a picture, or a file that is mapped into memory."""
+    if stored.frame_size is None and kind_of(path) not in VIEWS:
+        numbers = open_array(path, key)
+        return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
+    if key is not None:
+        raise InputError(f"{path}: --key is for .npz, .mat and HDF5 files, and this is none")
     if stored.frame_size is not None:
         return stored.frames_in(path)
-    if kind_of(path) in VIEWS:
-        return _of_one_channel(decode(picture_of(path, EXACT)))
-    numbers = open_array(path, key)
-    return _of_one_channel(numbers[None] if numbers.ndim == 2 else numbers)
+    return _of_one_channel(decode(picture_of(path, EXACT)))
 
 
 def _of_one_channel(frames: np.ndarray) -> np.ndarray:

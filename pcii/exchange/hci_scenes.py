@@ -16,17 +16,18 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pcii.base import InputError, Report, silent, visible
 from pcii.exchange.depth_files import FARTHEST_MM, NEAREST_MM
-from pcii.exchange.elemental_images import KnownViews, import_images, listed_names
-from pcii.exchange.number_files import decode, picture_of
-from pcii.exchange.posed_exports import pictures_of, write_png
-from pcii.exchange.stated_images import Encoding, Note, Optics, warn
+from pcii.exchange.elemental_images import Encoding, KnownViews, import_images
+from pcii.exchange.number_files import decode, listed_names, picture_of
+from pcii.exchange.stated_images import Note, Optics, warn
+from pcii.figures import to_srgb8
+from pcii.sections import demosaic
 from pcii.store import Dataset, first_fault
 from pcii.types import Truth
 
@@ -35,6 +36,8 @@ PATTERN = "input_Cam{index:03d}.png"
 VIEW = re.compile(r"input_cam.*\.png", re.IGNORECASE)
 DEPTH, DISPARITY = "gt_depth_lowres.pfm", "gt_disp_lowres.pfm"
 README = "README.txt"
+WHITE_QUANTILE = 0.999
+"""Share of the values of the middle view that are at most white. A larger one makes pictures darker."""
 INFINITY_M = 1e9
 """Focus distance of a grid without shear. The benchmark's own tools divide by the focus distance and multiply
 with it: infinity or 0 would make NaN of all disparities; this changes none by more than 1e-8 of itself."""
@@ -152,8 +155,8 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
     Raises `InputError` for a grid whose pitch or shear differs between the axes, or whose shear is negative.
     """
     grid = dataset.grid
-    baseline_mm = _of_both_axes(dataset, "pitch_mm", grid.pitch_mm)
-    shear_px = _of_both_axes(dataset, "shear_px", grid.shear_px)
+    baseline_mm = _of_both_axes(dataset, "pitch_mm")
+    shear_px = _of_both_axes(dataset, "shear_px")
     if shear_px < 0:
         raise InputError(
             f"{dataset.path}: shear_px: the HCI layout has a focus distance, and views sheared by "
@@ -188,9 +191,9 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
     )
 
 
-def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> float:
+def _of_both_axes(dataset: Dataset, name: Literal["pitch_mm", "shear_px"]) -> float:
     """The value that both axes have in common; that of an axis with one camera does not matter."""
-    grid = dataset.grid
+    grid, pair = dataset.grid, getattr(dataset.grid, name)
     values = [value for value, cameras in zip(pair, (grid.cols, grid.rows), strict=True) if cameras > 1]
     if len(values) == 2 and not math.isclose(*values, rel_tol=1e-9):
         raise InputError(
@@ -207,7 +210,11 @@ def _parameters(
     grid, recipe = dataset.grid, dataset.manifest.recipe
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
     lens = recipe.get("grid", {}).get("lens")
-    lowest, highest = _range_px(dataset, disparity_px)
+    depths_mm = dataset.analysis.get("z_range_mm") if dataset.truth is None else dataset.truth.z_mm
+    lowest = highest = math.nan
+    if depths_mm is not None:  # outwards to a tenth of a pixel
+        disparities = disparity_px(np.asarray(depths_mm))
+        lowest, highest = math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
     scene = re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name)
     # A camera of Blender's looks along -Z with Y up; these look along +Z with Y down: turned by pi about X.
     return f"""[intrinsics]
@@ -247,13 +254,44 @@ depth_map_scale = 1.0
 """
 
 
-def _range_px(dataset: Dataset, disparity_px: Callable[[np.ndarray], np.ndarray]) -> tuple[float, float]:
-    """Least and largest disparity, outwards to a tenth of a pixel: of the truth, else of the recipe's range.
+def pictures_of(dataset: Dataset) -> tuple[Callable[[int, int], np.ndarray], dict[str, Any], str]:
+    """Pictures of a dataset's radiance, whose mosaics are demosaiced, or else of its photons, in grey.
 
-    NaN if nothing is known of the depths.
+    Returns a function of the picture of camera (k, l), uint8 (H, W, 3), with one white for all, which of
+    radiance is a value of the middle view; what its numbers are, as members of transforms.json; and the same
+    as the end of a sentence. Raises `InputError` for a dataset with neither.
     """
-    depths_mm = dataset.analysis.get("z_range_mm") if dataset.truth is None else dataset.truth.z_mm
-    if depths_mm is None:
-        return math.nan, math.nan
-    disparities = disparity_px(np.asarray(depths_mm))
-    return math.floor(10 * disparities.min()) / 10, math.ceil(10 * disparities.max()) / 10
+    views = dataset.views
+    if views is None:
+        counts = dataset.counts
+        photons = max(int(counts.events.n.max(initial=0)), 1)
+
+        def grey(k: int, l: int) -> np.ndarray:
+            levels = np.round(255 / photons * counts.view(k, l)).astype(np.uint8)
+            return np.repeat(levels[..., None], 3, axis=2)
+
+        meaning = f"photon counts in grey, not gamma-encoded: 255 is {photons} photons in the pixel"
+        members = {"quantity": "photons", "unit": "photons", "white": float(photons), "cfa": dataset.cfa}
+        return grey, members, meaning
+
+    def colours(k: int, l: int) -> np.ndarray:
+        image = views.view(k, l)
+        return image if views.cfa is None else demosaic(image[..., 0], cfa=views.cfa)
+
+    unit = visible(str(dataset.manifest.radiance_unit or "radiance"))
+    middle = colours(views.grid.rows // 2, views.grid.cols // 2)
+    white = float(np.float32(np.quantile(middle, WHITE_QUANTILE, method="lower")))
+    white = white if white > 0 else 1.0
+    meaning = f"radiance, encoded as sRGB: 255 is {white:.6g} ({unit}) or more; mosaics are demosaiced"
+    members = {"quantity": "radiance", "unit": unit, "white": white}
+    return lambda k, l: to_srgb8(colours(k, l), white), members, meaning
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """Write an image (H, W) or (H, W, 3), uint8 or uint16, as PNG.
+
+    Pillow, which draws the other pictures, has no colour images of 16 bits.
+    """
+    import imagecodecs
+
+    path.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(image)))

@@ -20,14 +20,11 @@ from pcii.base import InputError, times, visible
 LARGEST_BYTES = 1 << 33
 """Most memory of all pages of a TIFF file, and of the array of an HDF5 file: 8 GiB."""
 STARTS = {
-    b"\x89PNG\r\n\x1a\n": "PNG",
-    b"\xff\xd8\xff": "JPEG",
-    b"II*\0": "TIFF",
-    b"MM\0*": "TIFF",
-    b"II+\0": "TIFF",
-    b"MM\0+": "TIFF",
-    b"\x76\x2f\x31\x01": "EXR",
-    b"Pf": "PFM",
+    "PNG": b"\x89PNG\r\n\x1a\n",
+    "JPEG": b"\xff\xd8\xff",
+    "TIFF": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
+    "EXR": b"\x76\x2f\x31\x01",
+    "PFM": b"Pf",
 }
 GIT_LFS_START = b"version https://git-lfs"
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
@@ -101,7 +98,7 @@ class Picture:
 def kind_of(path: Path) -> str | None:
     """PNG, JPEG, TIFF, EXR or PFM, by the first bytes of a file; None for any other."""
     head = _head_of(path)
-    return next((kind for start, kind in STARTS.items() if head.startswith(start)), None)
+    return next((kind for kind, starts in STARTS.items() if head.startswith(starts)), None)
 
 
 def _head_of(path: Path) -> bytes:
@@ -353,7 +350,16 @@ def _chosen(path: Path, key: str | None, shapes: dict[str, tuple[int, ...]]) -> 
         return wanted
     if not shapes:
         raise InputError(f"{path}: holds no array of numbers")
-    names = [f"{name} {times(shape)}" for name, shape in shapes.items()]
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    names = listed_names([f"{name} {times(shape)}" for name, shape in shapes.items()], most=MOST_NAMED)
     which = "say which with --key" if key is None else f"and no {visible(key)}; correct --key"
-    raise InputError(f"{path}: holds {visible(', '.join(names[:MOST_NAMED]))}{more}; {which}")
+    raise InputError(f"{path}: holds {names}; {which}")
+
+
+def listed_names(names: Sequence[str], most: int = 3) -> str:
+    """The first names of files, and how many more there are.
+
+    >>> listed_names(["a.png", "b.png", "c.png", "d.png", "e.png"])
+    'a.png, b.png, c.png and 2 more'
+    """
+    more = len(names) - most
+    return visible(", ".join(names[:most])) + (f" and {more} more" if more > 0 else "")

@@ -5,18 +5,16 @@ those of the pictures.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from pcii.base import InputError, Report, silent
 from pcii.exchange.count_arrays import import_counts
-from pcii.exchange.elemental_images import import_images
+from pcii.exchange.elemental_images import Encoding, import_images
 from pcii.exchange.frame_files import AS_COUNTED, FrameFormat
 from pcii.exchange.number_files import open_array
-from pcii.exchange.posed_exports import MM_PER_M
-from pcii.exchange.stated_images import Encoding, Note, warn
-from pcii.exchange.transforms_file import MOST_PX, ROUNDING, TransformsFile, read_transforms
+from pcii.exchange.stated_images import Note, Optics, warn
+from pcii.exchange.transforms_file import MM_PER_M, MOST_PX, ROUNDING, TransformsFile
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 NEAREST_SHARE = 1 / 4
@@ -33,7 +31,7 @@ USUAL_PIXEL_MM = 0.005
 
 
 def import_posed_pictures(
-    source: str | Path,
+    file: TransformsFile,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -43,19 +41,16 @@ def import_posed_pictures(
     report: Report = silent,
     note: Note = warn,
 ) -> Views:
-    """Views and cameras of a transforms.json, whose poses are of one plane grid of parallel cameras.
+    """Views and cameras of the pictures of a file, whose poses are of one plane grid of parallel cameras.
 
-    The file has the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
-    says how large the film is. For `encoding` and `cfa` see `import_images`. Raises `InputError`, naming file
-    and member, frame or picture, for what is missing, wrong, or no such grid.
+    The lengths of the film are as in `find_grid`, `encoding` and `cfa` as in `import_images`.
     """
-    file = read_transforms(source, note=note)
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
     return import_images(files, None, grid, encoding=encoding, cfa=cfa, report=report, note=note)
 
 
 def import_posed_cubes(
-    source: str | Path,
+    file: TransformsFile,
     *,
     focal_mm: float | None = None,
     pixel_mm: float | None = None,
@@ -66,14 +61,13 @@ def import_posed_cubes(
     report: Report = silent,
     note: Note = warn,
 ) -> PhotonCounts:
-    """Photon counts of the photon cubes that a transforms.json names, whose cameras are those of pictures.
+    """Photon counts of the photon cubes of a file, whose cameras are those of pictures.
 
     A cube is (T, H, W) or, if the file or `stored` says so, packed, uint8 (T, H, W / 8); an axis of one
     channel may follow, or of three of which `cfa` says the one that each pixel keeps. `frames` are the first
     and the last to add up; `cfa` is the Bayer pattern where the file has none. Raises `InputError`, naming
     the file, for cubes that differ from what it says.
     """
-    file = read_transforms(source, note=note)
     if file.cfa is not None and cfa not in (None, file.cfa):
         raise InputError(f"{file.path}: cfa: is {file.cfa}; leave out --cfa")
     grid, files = find_grid(file, focal_mm, pixel_mm, sensor_mm, note)
@@ -97,8 +91,9 @@ def find_grid(
     """The grid of the frames of a file, in whichever order they are, and the file of each camera, (K, L).
 
     Pitch and shear are fitted by least squares; an axis with one camera has the pitch of the other, a single
-    camera has 1 mm. One length of the film gives the others. Raises `InputError` for more than one, and for
-    cameras that are no such grid, with the frame that is off most.
+    camera has 1 mm. The file has the ratio of focal length and pixel size: one length of the film gives the
+    others. Raises `InputError` for more than one, and for cameras that are no such grid, with the frame that
+    is off most.
     """
     from scipy.spatial import KDTree
 
@@ -136,16 +131,9 @@ def find_grid(
             f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
             "below it, alike in all: sections and depth are in the frame of the pictures"
         )
-    grid = CameraGrid(
-        rows=int(rows),
-        cols=int(cols),
-        pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
-        focal_mm=focal_mm,
-        pixel_mm=pixel_mm,
-        height=file.height,
-        width=file.width,
-        shear_px=(_digits(slopes[3]), _digits(slopes[4])),
-    )
+    pitch_mm, shear_px = (_digits(pitch[0]), _digits(pitch[1])), (_digits(slopes[3]), _digits(slopes[4]))
+    optics = Optics(pitch_mm=pitch_mm, focal_mm=focal_mm, pixel_mm=pixel_mm, shear_px=shear_px)
+    grid = optics.grid((rows, cols, file.height, file.width))
     return grid, np.array(file.file_paths, object)[numbers]
 
 

@@ -1,22 +1,26 @@
-"""What is stated of images: where cameras stand, how views are stored, and how numbers stand for light."""
+"""What is stated of images: where cameras stand, how views are stored, and which file is of which view.
+
+A pattern names the files: {row} and {col}, or {index} that counts along the rows, and * for any text. Of
+photon counts {frame} too, if each file holds one frame.
+"""
 
 import math
+import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal, cast
+from itertools import product
+from pathlib import Path, PurePosixPath
+from typing import cast
 
 import numpy as np
 
-from pcii.base import InputError, srgb_to_linear
+from pcii.base import InputError, times, visible
+from pcii.exchange.number_files import VIEWS, Picture, listed_names, picture_of
 from pcii.types import CameraGrid
 
-Encoding = Literal["srgb", "linear"] | float
-"""How numbers stand for light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
-LARGEST_ENCODED = 2.0
-"""Largest encoded float that is taken: white is 1, and sharpened pictures exceed it a little. Numbers of 8
-bits or more, which are refused, reach far more: any limit from 1.5 to 100 decides alike."""
+FIELD = re.compile(r"\{(row|col|index|frame)(?::(?:0[1-9])?d?)?\}")
+MOST_VIEWS = 100_000
 MANY_VIEWS = 100
 """An array of more views than this, and of more than each view has pixels, has its axes in another order:
 what was taken for cameras are pixels."""
@@ -155,7 +159,11 @@ class ViewTable:
         if "N" in axes:
             table = self.order.table_of(name, numbers.shape[0], self.grid)
             numbers = numbers.reshape(*table, *numbers.shape[1:])
-        return self.order.arrange(numbers)
+        views = self.order.arrange(numbers)
+        if self.grid is not None and views.shape[:2] != tuple(self.grid):
+            sizes = times(views.shape[:2]), times(self.grid)
+            raise InputError(f"{name}: has {sizes[0]} views, and --grid states {sizes[1]}")
+        return views
 
 
 def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:
@@ -172,44 +180,93 @@ def _in_order(numbers: np.ndarray, name: str, axes: str) -> np.ndarray:
     return numbers.transpose([axes.index(axis) for axis in AXES if axis in names])
 
 
-def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None = None) -> np.ndarray:
-    """Linear radiance, float32, of whole numbers (of 1 at `most`) or of floats.
+def picture_of_views(path: Path, note: Note, *, has_pages: bool = True) -> Picture:
+    """A picture of all views: with a page for each, or a single one of a lens array.
 
-    `most` is by default the largest number of the type. Without an encoding whole numbers are sRGB, as in
-    nearly all picture files, and floats are linear. Raises `InputError` for an encoding that is none, for
-    numbers that are NaN or infinite, for encoded ones below 0 or far above 1, and for light that is too
-    bright for float32.
-
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
-    [0.0, 0.216, 1.0]
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
-    [0.0, 0.502, 1.0]
+    `note` takes what else is in the file. Raises `InputError` for the other kind.
     """
-    is_whole = numbers.dtype.kind == "u"
-    if encoding is None:
-        encoding = "srgb" if is_whole else "linear"
-    elif encoding not in ("srgb", "linear") and not (
-        isinstance(encoding, int | float) and 0.1 <= encoding <= 10
-    ):
-        raise InputError(f"encoding: expected srgb, linear, or a gamma from 0.1 to 10, got {encoding!r}")
-    full = most or (np.iinfo(numbers.dtype).max if is_whole else 1)
-    if encoding == "srgb" and is_whole:  # few values are many pixels
-        return srgb_to_linear(np.arange(full + 1) / full).astype(np.float32)[numbers]
-    share = numbers / np.float32(full) if is_whole else numbers
-    least, top = share.min(), share.max()
-    if not np.isfinite([least, top]).all():
-        raise InputError("holds NaN or infinity; radiance is finite")
-    if encoding != "linear" and not 0 <= least <= top <= LARGEST_ENCODED:
+    picture = picture_of(path, VIEWS)
+    if has_pages and picture.pages == 1:
         raise InputError(
-            f"holds numbers from {least:g} to {top:g}; encoded light is from 0 to 1, which is white: divide "
-            "by the number of white"
+            f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
+            "folder and --pattern"
         )
-    with np.errstate(over="ignore"):
-        if encoding == "srgb":
-            share = srgb_to_linear(share)
-        elif encoding != "linear":
-            share = (share if is_whole else share.astype(np.float64)) ** encoding
-        linear = share.astype(np.float32)
-    if not np.isfinite(linear).all():
-        raise InputError("holds light that is too bright for float32")
-    return linear
+    if picture.pages > 1 and not has_pages:
+        raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
+    if picture.unused:
+        note(f"not used: {picture.unused} in {path.name}")
+    return picture
+
+
+def files_by_camera(folder: Path, pattern: str, views: ViewTable, note: Note) -> np.ndarray:
+    """Paths (K, L) of the files in `folder` that fit a pattern such as "{col}_{row}.png".
+
+    With {frame} they are (K, L, T), those of the frames of each view in the order of their numbers. {row} and
+    {col} are axes; the numbers of {index} count along the table in which the views are stored. Numbers may
+    begin anywhere and have a sign; endings in capitals fit too. Raises `InputError` for a pattern that is
+    none, for files that are missing and for two of one view; `note` takes the names of other files.
+    """
+    grid, order = views.grid, views.order
+    expression, fields = _expression(pattern)
+    names = [name for name in fields if name != "frame"]
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder; --pattern names the files of a folder")
+    files: dict[tuple[int, ...], Path] = {}
+    others: list[str] = []
+    for path in sorted(folder.glob("/".join("*" for _ in PurePosixPath(pattern).parts))):
+        if not path.is_file() or path.name.startswith("."):
+            continue
+        name = path.relative_to(folder).as_posix()
+        match = expression.fullmatch(name)
+        if match is None:
+            others.append(name)
+            continue
+        place = tuple(int(match[field]) for field in fields)
+        if place in files:
+            raise InputError(f"{path}: is of the same view as {files[place].name}")
+        files[place] = path
+    if not files:
+        hint = f"its files are named like {visible(others[0])}" if others else "there are no files"
+        raise InputError(f"{folder}: no file fits the pattern {visible(pattern)}; {hint}")
+    if others:
+        note(f"not used: {listed_names(others)}, since --pattern does not fit")
+    numbers: list[Sequence[int]] = [sorted({*column}) for column in zip(*files, strict=True)]
+    for axis in range(len(names)):  # whereas numbers of frames may have gaps
+        numbers[axis] = range(numbers[axis][0], numbers[axis][-1] + 1)
+    if names == ["index"] and grid is not None:  # the last views may be missing
+        first, end = numbers[0][0], numbers[0][-1] + 1
+        numbers[0] = range(first, max(end, first + math.prod(grid)))
+    if math.prod(axis[-1] - axis[0] + 1 for axis in numbers[: len(names)]) > MOST_VIEWS:
+        ends = " and ".join(f"{name} {r[0]} to {r[-1]}" for name, r in zip(names, numbers, strict=False))
+        raise InputError(f"{folder}: {ends} are too far apart for a grid of at most {MOST_VIEWS} views")
+    if names == ["index"]:
+        table = order.table_of(folder, len(numbers[0]), grid)
+    else:
+        table = len(numbers[0]), len(numbers[1])
+        if grid is not None and table != (grid[::-1] if order.swap_axes else grid):
+            raise InputError(
+                f"{folder}: {pattern} gives {table[0]} rows and {table[1]} columns, not those of --grid"
+            )
+    missing = [place for place in product(*numbers) if place not in files]
+    if missing:
+        first = ", ".join(f"{name} {number}" for name, number in zip(fields, missing[0], strict=True))
+        size = times([*map(len, numbers)])
+        raise InputError(f"{folder}: {len(missing)} of {size} files missing, first {first}")
+    paths = np.array([files[place] for place in sorted(files)], object)
+    return order.arrange(paths.reshape(*table, *map(len, numbers[len(names) :])))
+
+
+def _expression(pattern: str) -> tuple[re.Pattern[str], list[str]]:
+    """The regular expression of file names, and the numbers in them: row and col, or index; maybe frame."""
+    fields = sorted(FIELD.findall(pattern), key=("row", "col", "index", "frame").index)
+    names = [name for name in fields if name != "frame"]
+    is_known = names in (["index"], ["row", "col"]) and fields.count("frame") < 2
+    if not is_known or {*FIELD.sub("", pattern)} & {*"{}"}:
+        raise InputError(
+            f'pattern: expected {{row}} and {{col}}, or {{index}}, as in "{{col}}_{{row}}.png" or '
+            f'"view{{index:03d}}_*.png"; got {pattern!r}'
+        )
+    escaped = re.escape(pattern).replace(r"\*", "[^/]*")
+    number = r"(?P<\1>[+-]?[0-9]+)"
+    expression = re.compile(re.sub(r"\\\{([a-z]+).*?\\\}", number, escaped), re.IGNORECASE)
+    return expression, fields

@@ -18,10 +18,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pcii.base import InputError, visible
 from pcii.exchange.number_files import VIEWS, picture_of
-from pcii.exchange.posed_exports import TRANSFORMS
 from pcii.exchange.stated_images import Note, warn
 from pcii.store import first_fault
 
+TRANSFORMS = "transforms.json"
+MM_PER_M = 1000.0
 MOST_POSES = 1 << 16
 """Frames of a file: a photon cube of visionsim has a pose for each of its frames, a thousand or more."""
 MOST_PX = 0.1

@@ -9,6 +9,7 @@ The index is written when the work on the collection ends or is interrupted. It 
 all the manifests, and the hash of each.
 """
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from pcii.base import InputError, ShortForm, listed, write_bytes_safely
 from pcii.store.dataset import Dataset, open_dataset
-from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, DatasetManifest, hash_bytes, hash_file
+from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, DatasetManifest, hash_file
 
 if TYPE_CHECKING:
     import pandas
@@ -131,7 +132,7 @@ def write_index(root: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 def index_bytes(rows: Iterable[Mapping[str, Any]]) -> bytes:
     """The index of these rows as it is written."""
     lines = b"".join(json.dumps(row, allow_nan=False).encode() + b"\n" for row in rows)
-    return lines + json.dumps({"sha256": hash_bytes(lines)}).encode() + b"\n"
+    return lines + json.dumps({"sha256": hashlib.sha256(lines).hexdigest()}).encode() + b"\n"
 
 
 def read_index(root: Path) -> list[dict[str, Any]]:

@@ -4,10 +4,12 @@ It depends on the data and the terms alone, and no manifest lists it: other term
 LICENSE has the terms alone, where programs that collect data look for them.
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
-from pcii.base import in_markdown, locked, temporaries_of, visible, web_address, write_bytes_safely
+from pcii.base import in_markdown, locked, temporaries_of, visible, write_bytes_safely
 from pcii.store.collection import is_collection, read_index
 from pcii.store.folders import COLLECTION, COLLECTION_FOLDER, MANIFEST, read_manifest
 
@@ -22,29 +24,12 @@ MOST_NAMED = 3
 """Largest number of scenes in the title of a collection without one."""
 INSTALL = f"import pcii  # pip install {PROJECT}"
 """A README.md without this line is somebody else's."""
-TEXT = """# {title}
-
-{content}
-
-```python
-{install}
-
-{example}
-dataset.counts, dataset.truth, dataset.views, dataset.grid
-```
-
-X points right, Y down, Z forward, in millimetres; `z` is planar depth. Each array says its axes, unit and
-meaning in its attributes. The manifest has the recipe, from which `simgen generate` makes the same data, and
-the SHA-256 of every file, with which `simgen verify` compares them.
-
-{terms}
-
-Made with
-
-> {software}
-"""
 OPENING = "The data in this folder may be used under the terms of"
 """A LICENSE without this line is somebody else's."""
+
+
+OF_ADDRESSES = "%/:?#[]@!$&'()*+,;=~"
+"""What addresses of the web hold beside letters, digits and - . _ as it is."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +46,14 @@ class Terms:
 
     @property
     def address(self) -> str:
-        """Address of the licence."""
-        return web_address(self.licence) or web_address(f"https://spdx.org/licenses/{self.licence}.html")
+        """Address of the licence, with what addresses cannot hold percent-encoded.
+
+        >>> Terms("CC-BY-4.0").address, Terms("https://example.org/a b").address
+        ('https://spdx.org/licenses/CC-BY-4.0.html', 'https://example.org/a%20b')
+        """
+        is_address = re.match("https?://", self.licence, re.IGNORECASE)
+        address = self.licence if is_address else f"https://spdx.org/licenses/{self.licence}.html"
+        return quote(address, safe=OF_ADDRESSES, errors="backslashreplace")
 
     @property
     def reference(self) -> str:
@@ -89,14 +80,27 @@ def write_card(root: Path, terms: Terms) -> None:
         title, grid = manifest.title or "Integral images", manifest.grid
         pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
         content = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, {pattern}."
-    text = TEXT.format(
-        title=in_markdown(title),
-        content=f"Integral imaging in little light. {content}",
-        install=INSTALL,
-        example=example,
-        terms=_terms_in_markdown(terms),
-        software=SOFTWARE,
-    )
+    text = f"""# {in_markdown(title)}
+
+Integral imaging in little light. {content}
+
+```python
+{INSTALL}
+
+{example}
+dataset.counts, dataset.truth, dataset.views, dataset.grid
+```
+
+X points right, Y down, Z forward, in millimetres; `z` is planar depth. Each array says its axes, unit and
+meaning in its attributes. The manifest has the recipe, from which `simgen generate` makes the same data, and
+the SHA-256 of every file, with which `simgen verify` compares them.
+
+{_terms_in_markdown(terms)}
+
+Made with
+
+> {SOFTWARE}
+"""
     _write(root, CARD, text, INSTALL)
 
 

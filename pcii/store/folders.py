@@ -200,7 +200,7 @@ def first_fault(fault: ValidationError) -> str:
     return visible(": ".join(filter(None, (member, first["msg"].removeprefix("Value error, ")))))
 
 
-def hash_bytes(content: bytes) -> str:
+def _hash_bytes(content: bytes) -> str:
     """SHA-256 of bytes, in hex."""
     return hashlib.sha256(content).hexdigest()
 
@@ -213,7 +213,7 @@ def hash_file(path: Path) -> str:
 
 def hash_json(value: Any) -> str:
     """SHA-256, in hex, of a value that JSON can hold; the order of members of objects does not matter."""
-    return hash_bytes(json.dumps(value, sort_keys=True).encode())
+    return _hash_bytes(json.dumps(value, sort_keys=True).encode())
 
 
 def list_files(root: Path, parts: Iterable[str]) -> dict[str, dict[str, Any]]:
@@ -245,7 +245,7 @@ def read_listed(root: Path, name: str, entry: Mapping[str, Any]) -> bytes:
     """Content of a listed file; `InputError` if it is missing, or has another size or hash."""
     check_size(root, name, entry)
     content = (root / name).read_bytes()
-    if hash_bytes(content) != entry["sha256"]:
+    if _hash_bytes(content) != entry["sha256"]:
         raise InputError(f"{root / name}: its content does not match the manifest's SHA-256; {REMEDY}")
     return content
 
@@ -312,7 +312,7 @@ class FolderKind(Generic[AnyManifest]):
         document = {"format": self.format, "format_version": self.version, **content}
         blank = json_bytes({**document, "sha256": _NO_CHECKSUM})
         before, after = blank.rsplit(_NO_CHECKSUM.encode(), 1)
-        write_bytes_safely(folder / self.document, before + hash_bytes(blank).encode() + after)
+        write_bytes_safely(folder / self.document, before + _hash_bytes(blank).encode() + after)
 
     def read(self, folder: Path) -> AnyManifest:
         """The document; `InputError` if it is missing, changed, or of another format or content."""
@@ -328,7 +328,7 @@ class FolderKind(Generic[AnyManifest]):
             document = json.loads(content)
             checksum = document.pop("sha256").encode()
             before, _, after = content.rpartition(checksum)
-            if hash_bytes(before + _NO_CHECKSUM.encode() + after).encode() != checksum:
+            if _hash_bytes(before + _NO_CHECKSUM.encode() + after).encode() != checksum:
                 raise ValueError("its checksum does not match")
             if (document.get("format"), document.get("format_version")) != (self.format, self.version):
                 raise ValueError(f"expected a {self.format} of version {self.version}")

@@ -3,7 +3,7 @@
 import hashlib
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -20,7 +20,6 @@ from pcii.store.folders import (
     LOCK,
     RESULTS,
     RESULTS_FOLDER,
-    Files,
     entries,
     hash_file,
     read_listed,
@@ -102,35 +101,31 @@ def verify(path: Path, report: Report = silent) -> int:
     Returns the number of files. Raises `InputError` for the first file that is missing, truncated or changed,
     and for files that no manifest lists.
     """
-    document, files, datasets, unlisted = _contents(path)
-    total = len(files) + len(datasets)
-    count = 2 if is_collection(path) else len(files)  # of a collection its recipe and its index
-    for done, (name, entry) in enumerate(files.items(), start=1):
-        read_listed(path, name, entry)
-        report("verify", done, total)
-    for done, dataset in enumerate(datasets, start=len(files) + 1):
-        count += 1 + verify(dataset)
-        report("verify", done, total)
-    if unlisted:
-        advice = "repeat the command if they are unfinished, else move them away"
-        raise InputError(f"{path}: not listed in {document}: {', '.join(unlisted)}; {advice}")
-    return count
-
-
-def _contents(path: Path) -> tuple[str, Files, list[Path], list[str]]:
-    """What lists the contents of a folder, the files and the datasets that it lists, and what it does not."""
     if is_collection(path):
         COLLECTION_FOLDER.read(path)
         datasets = [check_manifest(path, row) for row in read_index(path)]
-        known = {INDEX, COLLECTION, LOCK, CARD, LICENCE, CERTIFICATE, CROISSANT}
-        known |= {dataset.name for dataset in datasets}
-        return INDEX, {}, datasets, sorted(entries(path, "collection") - known)
+        count = 2  # the recipe and the index
+        for done, dataset in enumerate(datasets, start=1):
+            count += 1 + verify(dataset)
+            report("verify", done, len(datasets))
+        known = {INDEX, COLLECTION, LOCK, CARD, LICENCE, CERTIFICATE, CROISSANT, *(d.name for d in datasets)}
+        _refuse_unlisted(path, INDEX, sorted(entries(path, "collection") - known))
+        return count
     kinds = DATASET_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER
-    kind = next(
-        (kind for kind in kinds if any((path / mark).exists() for mark in kind.marks)), DATASET_FOLDER
-    )
+    marked = (kind for kind in kinds if any((path / mark).exists() for mark in kind.marks))
+    kind = next(marked, DATASET_FOLDER)
     files = (read_manifest if kind is DATASET_FOLDER else kind.read)(path).files
-    return kind.document, files, [], unlisted_files(path, [kind.document, *files, CARD, LICENCE])
+    for done, (name, entry) in enumerate(files.items(), start=1):
+        read_listed(path, name, entry)
+        report("verify", done, len(files))
+    _refuse_unlisted(path, kind.document, unlisted_files(path, [kind.document, *files, CARD, LICENCE]))
+    return len(files)
+
+
+def _refuse_unlisted(path: Path, document: str, unlisted: Sequence[str]) -> None:
+    if unlisted:
+        advice = "repeat the command if they are unfinished, else move them away"
+        raise InputError(f"{path}: not listed in {document}: {', '.join(unlisted)}; {advice}")
 
 
 def print_verification(path: Path, *, as_json: bool) -> None:

@@ -13,7 +13,7 @@ from .focal_planes import check_depth_counts as check_depth_counts
 from .focal_planes import depth_of_total_disparity_mm as depth_of_total_disparity_mm
 from .focal_planes import disparity_px as disparity_px, FocalPlanes as FocalPlanes
 from .focal_planes import parallax_per_total as parallax_per_total, parallax_px as parallax_px
-from .focal_planes import project_px as project_px, Sections as Sections, Shifts as Shifts
+from .focal_planes import Sections as Sections, Shifts as Shifts
 from .focal_planes import total_disparity_px as total_disparity_px
 from .images import binary_scale as binary_scale, EXPOSURE as EXPOSURE, FULL_LIGHT as FULL_LIGHT
 from .images import Light as Light, limit_photons as limit_photons, MOST_PHOTONS as MOST_PHOTONS

@@ -237,20 +237,19 @@ class Readout:
             return mean
         lit = (counts > 0) & (samples > 0)
         number, trials = counts[lit].astype(np.float64), samples[lit].astype(np.float64) * self.frames
-        rate = _rate_of_bits(number, trials) if most == 1 else _rate(number / trials, most)
+        if most == 1:
+            with np.errstate(divide="ignore"):
+                few, many = -np.log1p(-number / trials), np.log(trials) - np.log(trials - number)
+            # Where most bits are set the difference is taken first, in whole numbers.
+            rate = np.where(number <= trials / 2, few, many)
+        else:
+            rate = _rate(number / trials, most)
         mean[lit] = self.frames * rate
         return mean
 
 
 PLAIN = Readout()
 """One frame without a limit."""
-
-
-def _rate_of_bits(number: np.ndarray, trials: np.ndarray) -> np.ndarray:
-    """-ln(1 - number / trials); where most bits are set the difference is taken first, in whole numbers."""
-    few = number <= trials / 2
-    with np.errstate(divide="ignore"):
-        return np.where(few, -np.log1p(-number / trials), np.log(trials) - np.log(trials - number))
 
 
 def clipped_mean(rate: np.ndarray, most: int) -> np.ndarray:

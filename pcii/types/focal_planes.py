@@ -24,21 +24,6 @@ from pcii.types.truth import PhotonTruth
 Shifts = Literal["nearest", "even"]
 
 
-def project_px(
-    grid: CameraGrid, point_mm: tuple[float, float, float], k: float, l: float
-) -> tuple[float, float]:
-    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers.
-
-    The virtual centre is the camera ((K-1)/2, (L-1)/2).
-    """
-    X, Y, Z = point_mm
-    down, right = k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2
-    scale_px = grid.focal_mm / grid.pixel_mm / Z
-    i = (grid.height - 1) / 2 + down * grid.shear_px[1] + scale_px * (Y - down * grid.pitch_mm[1])
-    j = (grid.width - 1) / 2 + right * grid.shear_px[0] + scale_px * (X - right * grid.pitch_mm[0])
-    return i, j
-
-
 def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """(horizontal, vertical) disparity at depth z due to the camera pitch alone, in px per camera step."""
     # Lengths whose product no float64 holds give 0, infinity or NaN; `FocalPlanes` refuses the last two.
@@ -56,9 +41,7 @@ def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray
 def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
     """Parallax between the outermost cameras of the longer axis of the grid in px: (N - 1) d, without shear.
 
-    >>> grid = CameraGrid(
-    ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
-    ... )
+    >>> grid = CameraGrid(rows=1, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=4)
     >>> total_disparity_px(grid, np.array([500.0, 1000.0])).tolist()
     [20.0, 10.0]
     """
@@ -113,9 +96,7 @@ class FocalPlanes(ShortForm):
 
         Raises `InputError` for an invalid depth, and for planes of another grid.
 
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
-        ... )
+        >>> grid = CameraGrid(rows=1, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=4)
         >>> FocalPlanes.at_depths(grid, [500, 1000]).nearest_shifts_px()[1].tolist()
         [[-10, 0, 10], [-5, 0, 5]]
         """
@@ -202,12 +183,12 @@ class FocalPlanes(ShortForm):
         return indices[0], indices[1]
 
     def project(
-        self, photons: PhotonEvents | PhotonTruth, plane: int, subpixel: int = 1
+        self, photons: PhotonEvents | PhotonTruth, plane: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Voxel row and column (N,) int64 of photons in the section at a plane, and whether inside, bool."""
-        rows, cols = (index[0] for index in self.take([plane]).voxel_indices(subpixel))
+        rows, cols = (index[0] for index in self.take([plane]).voxel_indices())
         row, col = rows[photons.k, photons.i].astype(np.int64), cols[photons.l, photons.j].astype(np.int64)
-        height, width = self.grid.height * subpixel, self.grid.width * subpixel
+        height, width = self.grid.shape_HW
         return row, col, (row >= 0) & (row < height) & (col >= 0) & (col < width)
 
 

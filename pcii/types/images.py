@@ -5,7 +5,7 @@ each pixel.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -19,15 +19,6 @@ MOST_PHOTONS = 1e12
 Scope = Literal["view", "channel", "scene", "exposure", "full-light"]
 
 
-class ArrayLike5D(Protocol):
-    """What `Views` reads of an array: its shape and one view at a time, so that views may stay on disk."""
-
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-
-    def __getitem__(self, index: Any, /) -> Any: ...
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Views(Plottable):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
@@ -38,14 +29,12 @@ class Views(Plottable):
     any object with `shape` and `[k, l]` (an array, or a reader that loads one view at a time).
     Raises `InputError` for another shape or an unknown pattern.
 
-    >>> grid = CameraGrid(
-    ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
-    ... )
+    >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
     >>> Views(np.ones((1, 2, 4, 6, 3)), grid)
     Views(shape=1 x 2 x 4 x 6 x 3)
     """
 
-    radiance: ArrayLike5D
+    radiance: Any
     grid: CameraGrid
     cfa: str | None = None
 

@@ -111,9 +111,7 @@ class PhotonCounts(Plottable):
         They are the sums of `frames`, each of which counts to 2^`bits` - 1, or without limit. Raises
         `InputError` for another shape, and for negative, fractional or too large counts.
 
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
-        ... )
+        >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
         >>> PhotonCounts.from_dense(np.ones((1, 2, 4, 6), dtype=np.uint16), grid, cfa="GRBG")
         PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, storage=dense)
         """
@@ -148,9 +146,7 @@ class PhotonCounts(Plottable):
         `InputError` for an index outside the grid, a negative, fractional or too large count, or lists of
         different lengths.
 
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
-        ... )
+        >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
         >>> counts = PhotonCounts.from_events([0, 0], [0, 1], [3, 3], [5, 4], [1, 2], grid)
         >>> counts.total, counts.view(0, 1)[3].tolist()
         (3, [0, 0, 0, 0, 2, 0])
@@ -258,9 +254,7 @@ class PhotonCounts(Plottable):
         is infinite where all F frames are full. Raises `InputError` for a camera outside the grid, for frames
         outside the exposure, and for a part of them where only the sums over all were stored.
 
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=1, width=2
-        ... )
+        >>> grid = CameraGrid(rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=1, width=2)
         >>> pixels = dict(k=[0, 0], l=[0, 0], i=[0, 0], j=[0, 1], n=[1, 2])
         >>> counts = PhotonCounts.from_events(**pixels, grid=grid, frames=4, bits=1, frame=[3, 0, 1])
         >>> counts.rate(0, 0).round(3).tolist(), counts.rate(0, 0, frames=(0, 2)).tolist()

@@ -1,7 +1,7 @@
 """A dataset of 2 x 3 views of 4 x 5 pixels, and ways to damage it."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,15 @@ import pytest
 from twins import unit_grid
 
 from pcii.base import InputError
-from pcii.store import DATASET_FOLDER, MANIFEST, save_dataset
+from pcii.store import (
+    COLLECTION_FOLDER,
+    DATASET_FOLDER,
+    MANIFEST,
+    index_row,
+    read_manifest,
+    save_dataset,
+    write_index,
+)
 from pcii.types import PhotonCounts, PhotonTruth, Truth, Views
 
 GRID = unit_grid(2, 3, 4, 5)
@@ -38,6 +46,17 @@ def make_dataset(root: Path, *, sparse: bool = True, frames: int | None = None, 
     depths: dict[str, Any] = {"z_mm": [540.0], "z_range_mm": (450.0, 750.0), "photon_budget": 10.0}
     save_dataset(root, images, truth, title="by hand", **depths)
     rewrite_manifest(root, **overrides)
+    return root
+
+
+def list_datasets(root: Path, values: Mapping[str, Mapping[str, Any]], **common: Any) -> Path:
+    """Make a collection of datasets: `values` of swept fields by their folders, `common` of its document."""
+    rows = [
+        index_row(name, fields, read_manifest(root / name), root / name / MANIFEST)
+        for name, fields in values.items()
+    ]
+    COLLECTION_FOLDER.write(root, {"fields": [*rows[0]["values"]], **common})
+    write_index(root, rows)
     return root
 
 

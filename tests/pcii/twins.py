@@ -29,6 +29,21 @@ def paper_grid(height: int = 1024, width: int = 1024) -> CameraGrid:
     )
 
 
+def project_px(
+    grid: CameraGrid, point_mm: tuple[float, float, float], k: float, l: float
+) -> tuple[float, float]:
+    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers.
+
+    The virtual centre is the camera ((K-1)/2, (L-1)/2).
+    """
+    X, Y, Z = point_mm
+    down, right = k - (grid.rows - 1) / 2, l - (grid.cols - 1) / 2
+    scale_px = grid.focal_mm / grid.pixel_mm / Z
+    i = (grid.height - 1) / 2 + down * grid.shear_px[1] + scale_px * (Y - down * grid.pitch_mm[1])
+    j = (grid.width - 1) / 2 + right * grid.shear_px[0] + scale_px * (X - right * grid.pitch_mm[0])
+    return i, j
+
+
 def colour_of(i: int, j: int, cfa: str | None) -> int:
     """Colour of one pixel, by reading the pattern's name."""
     return 0 if cfa is None else "RGB".index(cfa[2 * (i % 2) + j % 2])

@@ -18,6 +18,7 @@ from stored_datasets import (
     Z_MM,
     flip_a_bit,
     largest_file,
+    list_datasets,
     make_dataset,
     one_sentence,
     rewrite_manifest,
@@ -25,13 +26,10 @@ from stored_datasets import (
 
 import pcii
 from pcii.store import (
-    COLLECTION_FOLDER,
     COUNTS,
-    MANIFEST,
     RADIANCE,
     TRUTH,
     TRUTH_LABELS,
-    index_row,
     list_files,
     read_manifest,
     save_dataset,
@@ -352,14 +350,10 @@ def collection(tmp_path_factory):
     """Two datasets, by their seeds."""
     root = tmp_path_factory.mktemp("collections") / "sweep"
     root.mkdir()
-    rows = []
     for seed in (1, 2):
         recipe = {"scene": "two", "seed": seed, "photons": {"scope": "view", "budget": 10.0, "nested": []}}
-        path = make_dataset(root / f"seed_{seed}", frames=8, recipe=recipe, identity=f"no. {seed}")
-        rows.append(index_row(path.name, {"seed": seed}, read_manifest(path), path / MANIFEST))
-    COLLECTION_FOLDER.write(root, {"fields": ["seed"]})
-    write_index(root, rows)
-    return root
+        make_dataset(root / f"seed_{seed}", frames=8, recipe=recipe, identity=f"no. {seed}")
+    return list_datasets(root, {f"seed_{seed}": {"seed": seed} for seed in (1, 2)})
 
 
 def contents(root):

@@ -222,6 +222,7 @@ REFUSED = [
     ({"bits": 17}, "--bits: expected 1 to 16, got 17"),
     ({"bits": 2, "bitpack": True}, "--bits: expected 1 of packed frames, got 2"),
     ({"gain": 0.0}, "--gain: expected a number above 0, got 0"),
+    ({"gain": np.inf}, "--gain: expected a number above 0, got inf"),
     ({"offset": 3.0, "bitpack": True}, "--offset, --gain: are for numbers"),
     ({"frame_size": (0, 4)}, "--frame-size, --skip-bytes: expected at least one pixel"),
 ]
@@ -246,6 +247,22 @@ def test_the_axes_of_an_array_are_named(tmp_path: Path, axes: str) -> None:
         np.testing.assert_array_equal(found.dense, counts)
     views = pcii.import_arrays(stored.astype(np.float32), OPTICS, grid=grid, axes=axes)
     np.testing.assert_array_equal(views.radiance[..., 0], counts)
+
+
+def test_options_of_arrays_are_refused_where_there_is_none(tmp_path: Path) -> None:
+    pages = np.ones((4, H, W), np.uint16)
+    tifffile.imwrite(tmp_path / "0_0.tif", pages, photometric="minisblack")
+    pictures = {"source": tmp_path, "pattern": "{row}_{col}.tif"}
+    for options, words in (
+        ({"source": tmp_path / "0_0.tif", "axes": "NHW"}, "has a page for each view"),
+        ({"source": tmp_path / "0_0.tif", "key": "a"}, "has a page for each view"),
+        (pictures | {"axes": "THW"}, "--axes: is for one array"),
+        (pictures | {"key": "a"}, "0_0.tif: --key is for .npz, .mat and HDF5 files"),
+    ):
+        with pytest.raises(InputError, match=words):
+            imported_with_notes(**options)
+    with pytest.raises(InputError, match="of Path, got float64"):
+        pcii.import_images(np.ones((2, 2, H, W)), None, OPTICS)
 
 
 def test_a_picture_of_interlaced_views(tmp_path: Path, capsys: Any) -> None:
@@ -280,3 +297,5 @@ def test_frames_and_colours_have_axes_of_their_own_and_all_must_fit() -> None:
         for read in (import_counts, pcii.import_arrays):
             with pytest.raises(InputError, match=words):
                 read(np.ones(shape), OPTICS, axes=wrong)
+    with pytest.raises(InputError, match="array: has 2 x 3 views, and --grid states 3 x 2"):
+        import_counts(np.ones((H, W, 2, 3)), OPTICS, axes="HWKL", grid=(3, 2))

@@ -155,6 +155,7 @@ FILES = ["--bitpack", "--pattern", "{row}_{col}/frames.npy", *CAMERAS]
 WRONG: list[tuple[Callable[[Path], Path], list[Any], str]] = [
     (cubes(), [*FILES, "--frames", 3, 9], r"has the frames 0 to 8; .* got 3 and 9"),
     (cubes(), [*FILES, "--width", 10], "bits beyond the 10 pixels of a row are set"),
+    (cubes(), [*FILES, "--width", 0], "and the stated width is 0"),
     (cubes(), ["--counts", *FILES[1:], "--width", 13], "--width: is for packed frames"),
     (cubes(bitpack_dim=1), [], "bitpack_dim: expected 2, the width, got 1"),
     (cubes(w=30, cx=15), [], "rows are of 9 to 16 pixels, and the stated width is 30"),

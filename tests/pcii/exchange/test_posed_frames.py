@@ -13,7 +13,16 @@ from picture_folders import H, W, numbers, write
 from scipy.spatial.transform import Rotation
 from stored_datasets import one_sentence
 
-from pcii import Dataset, InputError, open_dataset, srgb_to_linear
+from pcii import (
+    CameraGrid,
+    Dataset,
+    InputError,
+    Views,
+    export_dataset,
+    open_dataset,
+    save_dataset,
+    srgb_to_linear,
+)
 from pcii.exchange import TransformsFile, find_grid, read_transforms
 from pcii.store import verify
 
@@ -274,6 +283,15 @@ def test_a_file_of_another_name_and_options_of_light_and_film(tmp_path: Path, ca
     assert (dataset.cfa, dataset.light.photons) == ("GRBG", 50)
     first, second = numbers(1, 2)[0, :2] / 255  # a row of GRBG begins with green and red
     np.testing.assert_allclose(dataset.views.view(1, 2)[0, :2, 0], [first[1], second[0]], rtol=1e-5)
+
+
+def test_cameras_that_the_source_states_are_not_to_be_corrected(tmp_path: Path, capsys) -> None:
+    grid = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=0.7, height=40, width=50)
+    noise = Views(np.random.default_rng(1).random((*grid.shape_KLHW, 1)), grid)
+    data = save_dataset(tmp_path / "data", noise)
+    source = export_dataset(data, "nerfstudio", tmp_path / "posed")
+    imported(source, "--focal-mm", 35)
+    assert re.search("from .* mm to infinity; name depths to `pcii run` by --z-mm", capsys.readouterr().out)
 
 
 def test_cubes_that_are_not_packed_come_in_by_their_poses(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from stored_datasets import (
     Z_MM,
     flip_a_bit,
     largest_file,
+    list_datasets,
     make_dataset,
     one_sentence,
     rewrite_manifest,
@@ -33,7 +34,6 @@ import pcii
 from pcii.base import InputError
 from pcii.store import (
     CARD,
-    COLLECTION_FOLDER,
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
@@ -42,20 +42,17 @@ from pcii.store import (
     TRUTH,
     Label,
     Terms,
-    index_row,
     list_files,
     open_dataset,
     radiance_name,
     read_array,
     read_exr,
-    read_manifest,
     read_part,
     save_dataset,
     verify,
     write_arrays_safely,
     write_card,
     write_exr_safely,
-    write_index,
     write_licence,
 )
 from pcii.store import LICENCE as LICENCE_FILE
@@ -316,16 +313,12 @@ TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "ht
 def make_pair(root: Path) -> Path:
     """Two datasets by hand that differ in their budget."""
     root.mkdir()
-    rows = []
-    for budget in (10.0, 20.0):
-        folder = root / f"budget_{budget:g}"
-        recipe = {"scene": "by hand", "seed": 3, "photons": {"budget": budget}}
-        make_dataset(folder, recipe=recipe, identity=f"{budget}", photons={"total": 5})
-        values = {"photons.budget": budget}
-        rows.append(index_row(folder.name, values, read_manifest(folder), folder / MANIFEST))
-    COLLECTION_FOLDER.write(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
-    write_index(root, rows)
-    return root
+    budgets, common = {"budget_10": 10.0, "budget_20": 20.0}, {"scene": "by hand", "seed": 3}
+    for name, budget in budgets.items():
+        recipe = common | {"photons": {"budget": budget}}
+        make_dataset(root / name, recipe=recipe, identity=name, photons={"total": 5})
+    values = {name: {"photons.budget": budget} for name, budget in budgets.items()}
+    return list_datasets(root, values, recipe=common)
 
 
 @pytest.mark.parametrize("make", [make_dataset, make_pair])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stored_datasets import flip_a_bit, make_dataset, one_sentence
+from stored_datasets import flip_a_bit, list_datasets, make_dataset, one_sentence
 from tiny_datasets import OWN, write_dataset
 
 from pcii.base import InputError, write_bytes_safely
@@ -23,12 +23,10 @@ from pcii.store import (
     Collection,
     check_free,
     check_size,
-    index_row,
     list_files,
     open_collection,
     print_verification,
     read_listed,
-    read_manifest,
     unlisted_files,
     verify,
     write_index,
@@ -56,13 +54,9 @@ def make_evaluation(root: Path) -> Path:
 
 def make_collection(root: Path) -> Path:
     """Two datasets and their index."""
-    rows = []
     for seed in (3, 4):
-        folder = write_dataset(root / f"seed_{seed}", seed, {OWN: 5 + seed})
-        rows.append(index_row(folder.name, {"seed": seed}, read_manifest(folder), folder / MANIFEST))
-    COLLECTION_FOLDER.write(root, {"fields": ["seed"]})
-    write_index(root, rows)
-    return root
+        write_dataset(root / f"seed_{seed}", seed, {OWN: 5 + seed})
+    return list_datasets(root, {f"seed_{seed}": {"seed": seed} for seed in (3, 4)})
 
 
 def flip(path: Path, rng: np.random.Generator) -> None:
@@ -168,7 +162,6 @@ def test_files_are_listed_with_their_sizes_and_hashes(tmp_path: Path) -> None:
 
 
 GRID = {"rows": 1, "cols": 2, "pitch_mm": (5, 5), "focal_mm": 50, "pixel_mm": 0.05, "height": 4, "width": 6}
-FIELDS = ["scene_number", "photons.budget", "seed"]
 
 
 @pytest.fixture
@@ -176,19 +169,16 @@ def folder(tmp_path: Path) -> Path:
     """Twenty scenes with two seeds each, without arrays."""
     root = tmp_path / "scenes"
     root.mkdir()
-    rows = []
+    values = {}
     for number in range(20):
         for seed in (1, 2):
             name = f"scene_{number}_seed_{seed}"
-            values = {"scene_number": number, "photons.budget": 100, "seed": seed}
+            values[name] = {"scene_number": number, "photons.budget": 100, "seed": seed}
             (root / name).mkdir()
             recipe = {"scene": "drawn", "scene_number": number, "seed": seed, "photons": {"budget": 100}}
             manifest = {"grid": GRID, "cfa": None, "files": {}, "recipe": recipe, "identity": name}
             DATASET_FOLDER.write(root / name, manifest)
-            rows.append(index_row(name, values, read_manifest(root / name), root / name / MANIFEST))
-    COLLECTION_FOLDER.write(root, {"fields": FIELDS})
-    write_index(root, rows)
-    return root
+    return list_datasets(root, values)
 
 
 @pytest.fixture

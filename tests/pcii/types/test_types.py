@@ -7,7 +7,7 @@ import pytest
 from camera_grids import grids
 from hypothesis import given
 from hypothesis import strategies as st
-from twins import colour_of, paper_grid, unit_grid, voxel_of
+from twins import colour_of, paper_grid, project_px, unit_grid, voxel_of
 
 from pcii.base import InputError
 from pcii.sections import reconstruct
@@ -25,7 +25,6 @@ from pcii.types import (
     colour_index,
     disparity_px,
     mosaic,
-    project_px,
 )
 
 NAN = float("nan")

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twins import project_px
 
 import pcii
 import simgen
 from pcii.base import InputError
-from pcii.types import project_px
 from simgen.renderer import RenderScene, backend, build, render_view
 
 pytestmark = pytest.mark.renders

@@ -10,11 +10,12 @@ import xarray
 import zarr
 from lit_scenes import MATT, ball, card, evenly_lit, grid
 from tiny import TINY_RECIPE
+from twins import project_px
 
 import simgen
 from pcii.metrics import TrueFocus
 from pcii.store import TRUTH, open_dataset
-from pcii.types import CameraGrid, FocalPlanes, Truth, project_px
+from pcii.types import CameraGrid, FocalPlanes, Truth
 from simgen.cameras import as_rig
 from simgen.dataset import generate
 from simgen.renderer import RenderScene, backend, build, render_view
