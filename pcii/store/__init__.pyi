@@ -8,10 +8,10 @@ from .collection import write_index as write_index
 from .dataset import COUNTS as COUNTS, Dataset as Dataset
 from .dataset import nested_name as nested_name, open_dataset as open_dataset, PHOTON_TRUTH as PHOTON_TRUTH
 from .dataset import RADIANCE as RADIANCE, radiance_name as radiance_name, sample as sample, SAMPLE as SAMPLE
-from .dataset import TRUTH as TRUTH, write_counts as write_counts
+from .dataset import TRUTH as TRUTH
 from .dataset_card import CARD as CARD, LICENCE as LICENCE, Terms as Terms, write_card as write_card
 from .dataset_card import write_licence as write_licence
-from .dataset_writer import save_dataset as save_dataset
+from .dataset_writer import save_dataset as save_dataset, write_counts as write_counts
 from .folders import check_free as check_free, check_size as check_size, COLLECTION as COLLECTION
 from .folders import COLLECTION_FOLDER as COLLECTION_FOLDER, DATASET_FOLDER as DATASET_FOLDER
 from .folders import DatasetManifest as DatasetManifest, entries as entries

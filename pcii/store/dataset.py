@@ -41,13 +41,11 @@ from pcii.store.folders import (
 from pcii.store.stored_arrays import (
     ARRAYS,
     COUNTS_LABELS,
-    DTYPES,
     PHOTON_TRUTH_LABELS,
     TRUTH_LABELS,
     Label,
     read_array,
     read_exr,
-    write_arrays_safely,
 )
 from pcii.types import (
     EXPOSURE,
@@ -67,8 +65,6 @@ FRAME = "frame"
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
-DENSE_SHARE = 1 / 16
-"""Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
 SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
 
 
@@ -340,19 +336,3 @@ def sample() -> Dataset:
     {1: 'ball', 2: 'bird'}
     """
     return open_dataset(SAMPLE)
-
-
-def write_counts(folder: Path, counts: PhotonCounts) -> None:
-    """Write photon counts as a group of arrays: as events, or dense where many pixels have photons."""
-    if counts.frame is None and not counts.is_sparse and counts.occupied_share > DENSE_SHARE:
-        dense = counts.dense
-        dtype = np.min_scalar_type(dense.max(initial=0))
-        small = dense.astype(dtype if dtype.name in DTYPES else np.int64)
-        write_arrays_safely(folder, {"dense": small}, COUNTS_LABELS)
-        return
-    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
-    pixels = {name: getattr(counts.events, name).astype(index) for name in "klij"}
-    if counts.frame is not None:
-        number = np.uint16 if counts.readout.frames <= 1 << 16 else np.uint32
-        pixels[FRAME] = counts.frame.astype(number)
-    write_arrays_safely(folder, {**pixels, "n": counts.events.n}, COUNTS_LABELS)

@@ -10,18 +10,28 @@ import numpy as np
 from pcii.base import InputError, named_in_errors, new_folder_safely
 from pcii.store.dataset import (
     COUNTS,
+    FRAME,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
     Dataset,
     open_dataset,
     radiance_name,
-    write_counts,
 )
 from pcii.store.folders import DATASET_FOLDER, DatasetManifest, check_free, hash_json, list_files, validated
 from pcii.store.provenance import PACKAGE, versions
-from pcii.store.stored_arrays import PHOTON_TRUTH_LABELS, TRUTH_LABELS, write_arrays_safely, write_exr_safely
+from pcii.store.stored_arrays import (
+    COUNTS_LABELS,
+    DTYPES,
+    PHOTON_TRUTH_LABELS,
+    TRUTH_LABELS,
+    write_arrays_safely,
+    write_exr_safely,
+)
 from pcii.types import OPTIONAL_MAPS, PhotonCounts, PhotonTruth, Truth, Views, check_depth_range, check_z_mm
+
+DENSE_SHARE = 1 / 16
+"""Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
 
 
 def save_dataset(
@@ -90,6 +100,22 @@ def save_dataset(
             validated(DatasetManifest, manifest)
             DATASET_FOLDER.write(new, manifest)
     return open_dataset(path)
+
+
+def write_counts(folder: Path, counts: PhotonCounts) -> None:
+    """Write photon counts as a group of arrays: as events, or dense where many pixels have photons."""
+    if counts.frame is None and not counts.is_sparse and counts.occupied_share > DENSE_SHARE:
+        dense = counts.dense
+        dtype = np.min_scalar_type(dense.max(initial=0))
+        small = dense.astype(dtype if dtype.name in DTYPES else np.int64)
+        write_arrays_safely(folder, {"dense": small}, COUNTS_LABELS)
+        return
+    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
+    pixels = {name: getattr(counts.events, name).astype(index) for name in "klij"}
+    if counts.frame is not None:
+        number = np.uint16 if counts.readout.frames <= 1 << 16 else np.uint32
+        pixels[FRAME] = counts.frame.astype(number)
+    write_arrays_safely(folder, {**pixels, "n": counts.events.n}, COUNTS_LABELS)
 
 
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
