@@ -1,24 +1,37 @@
-"""Parts of scenes that networks are trained on: shapes, materials, walls; and curved shapes as meshes,
-made of random numbers: bumpy blobs and heads, cones and vases, rings and knots.
+"""What drawn scenes consist of: colours, materials, shapes and lamps; and curved shapes as meshes, made of
+random numbers: bumpy blobs and heads, cones and vases, rings and knots.
 
 A curved surface is a grid of points (rows, columns, 3) in units of about its own radius. It is written as a
 PLY file of quads with texture coordinates, named after its content. Axes are the world's: Y down, Z forward.
+The order in which a function calls its `Random` is part of what the number of a scene means. Lengths are
+rounded to 0.1 mm.
 """
 
 import hashlib
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import numpy as np
 
 from pcii.base import write_bytes_safely
 from simgen.base import cache_folder
-from simgen.drawn import kinds as draw
-from simgen.drawn.kinds import UPRIGHT, Material, Objects, Table, Triple
+from simgen.spec import Scene, scene_of
 
-HALF_FIELD = 0.36
-"""Half of what a camera sees, by its depth."""
+Table = dict[str, Any]
+"""A TOML table."""
+Material = Callable[[Random], Table]
+Triple = tuple[float, float, float]
+
+UPRIGHT: Triple = 0.0, 0.0, 0.0
+SIZES = {
+    "sphere": ("radius_mm",),
+    "cylinder": ("radius_mm", "length_mm"),
+    "box": ("width_mm", "height_mm", "depth_mm"),
+    "card": ("width_mm", "height_mm"),
+}
 ROWS, COLUMNS = 64, 128
 HEADER = """ply
 format binary_little_endian 1.0
@@ -34,106 +47,134 @@ end_header
 """
 
 
-def any_shape(random: Random, size_mm: float, kind: str | None = None) -> tuple[Table, float, float]:
-    """A shape about as large as a ball of this radius, how far its middle is behind what is seen of it, and
-    half of its height."""
-    r, stretch = size_mm, math.exp(random.gauss(0, 0.35))
-    match kind or random.choice(["ball", "ball", "box", "box", "tin", "tin", "card"]):
-        case "ball":
-            return draw.sphere(r), 0.7 * r, r
-        case "box":
-            depth = 2 * r * draw.log_uniform(random, 0.2, 1)
-            return draw.box_of(1.8 * r * stretch, 1.8 * r / stretch, depth), depth / 2, 0.9 * r / stretch
-        case "tin":
-            return draw.cylinder_of(0.8 * r / stretch, 2 * r * stretch), 0.65 * r / stretch, r * stretch
-        case "rod":  # a tin of which a scene can have many
-            radius = 0.8 * r / stretch
-            return mesh_of(rod(), radius, r * stretch, radius), 0.8 * radius, r * stretch
-        case _:
-            return draw.card(2 * r * stretch, 2 * r / stretch), 0.0, r / stretch
+def log_uniform(random: Random, low: float, high: float) -> float:
+    """A number between the two, even in its logarithm."""
+    return low * (high / low) ** random.random()
 
 
-def any_turn(random: Random) -> Triple:
-    """A turn that still shows the front."""
-    return random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-40, 40)
+def colour(random: Random, low: float, high: float) -> list[float]:
+    """sRGB, each part between the two."""
+    return [round(random.uniform(low, high), 2) for _ in range(3)]
 
 
-def any_material(random: Random, pixels: int = 512) -> Table:
-    """Noise, one colour, stripes, checks, a star, text or metal."""
-    two = [draw.colour(random, 0.1, 0.5), draw.colour(random, 0.4, 0.9)]
-    if random.random() < 0.25:
-        return {"reflectance": draw.colour(random, 0.1, 0.9)}
-    if random.random() < 0.08:
-        return draw.metal(random.choice(["Ag", "Au", "Cu"]), draw.log_uniform(random, 0.08, 0.5))
-    # All are drawn, and one of them is taken.
-    noise = {
-        "type": "noise",
-        "exponent": round(random.uniform(0.7, 1.5), 2),
-        "contrast": round(random.uniform(0.1, 0.35), 2),
-        "colour": draw.colour(random, 0.3, 0.65),
-        "chroma": round(random.uniform(0, 0.5), 2),
-        "seed": random.randrange(100_000),
-    }
-    stripes = {
-        "type": "stripes",
-        "periods": random.randint(3, 30),
-        "angle_deg": round(random.uniform(-90, 90), 1),
-        "profile": random.choice(["square", "sine"]),
-        "colours": two,
-    }
-    checks = {"type": "checks", "rows": random.randint(2, 12), "columns": random.randint(2, 12)}
-    star = {"type": "star", "spokes": random.randint(4, 40), "colours": two}
-    text = {"type": "text", "text": random.choice(["photon", "a b c d e f", "Depth 42"]), "colours": two}
-    texture = random.choice([noise, stripes, checks | {"colours": two}, star, text])
-    return {"texture": texture | {"pixels": pixels}}
+def plain(random: Random) -> Table:
+    """A material of one colour."""
+    return {"reflectance": colour(random, 0.15, 0.85)}
 
 
-def large_material(random: Random) -> Table:
-    """What walls and floors are of: one colour, shades that change slowly, or patterns."""
-    if random.random() < 0.35:
-        return draw.plain(random)
-    if random.random() < 0.6:
-        return any_material(random, 1024)
-    shades = {
-        "type": "noise",
-        "exponent": round(random.uniform(1.6, 2.4), 2),
-        "contrast": round(random.uniform(0.1, 0.3), 2),
-        "colour": draw.colour(random, 0.3, 0.65),
-        "seed": random.randrange(100_000),
-        "pixels": 512,
-    }
-    return {"texture": shades}
-
-
-def add_wall(
+def noise(
     random: Random,
+    mean_colour: list[float] | None = None,
+    exponents: tuple[float, float] = (0.8, 1.3),
+    contrasts: tuple[float, float] = (0.15, 0.3),
+    most_chroma: float = 0.4,
+    seeds: int = 1000,
+) -> Table:
+    """Noise like that of natural scenes, of this mean colour or any, and without chroma at 0."""
+    texture: Table = {
+        "type": "noise",
+        "exponent": round(random.uniform(*exponents), 2),
+        "contrast": round(random.uniform(*contrasts), 2),
+        "colour": mean_colour or colour(random, 0.3, 0.65),
+    }
+    if most_chroma:
+        texture["chroma"] = round(random.uniform(0, most_chroma), 2)
+    return {"texture": texture | {"seed": random.randrange(seeds)}}
+
+
+def metal(name: str, roughness: float) -> Table:
+    """A metal by its symbol; the roughness is rounded to 0.01."""
+    return {"finish": {"type": "metal", "name": name, "roughness": round(roughness, 2)}}
+
+
+def glossy(random: Random) -> Table:
+    """Plastic of one colour, or metal, each from a near mirror to dull."""
+    roughness = round(10 ** random.uniform(-1.4, -0.3), 2)
+    if random.random() < 0.5:
+        return plain(random) | {"finish": {"type": "plastic", "roughness": roughness}}
+    return metal(random.choice(["Ag", "Al", "Au", "Cr", "Cu", "W"]), roughness)
+
+
+class Objects(list[Table]):
+    """The objects of a scene."""
+
+    def add(self, name: str, place_mm: Triple, rotation_deg: Triple, shape: Table, material: Table) -> None:
+        """Put another one beside them."""
+        thing: Table = {"name": name, "shape": shape, "material": material}
+        thing["position_mm"] = [round(value, 1) for value in place_mm]
+        self.append(thing | {"rotation_deg": [round(value, 1) for value in rotation_deg]})
+
+
+def shape_of(kind: str, *sizes_mm: float) -> Table:
+    """A sphere, an upright cylinder, a box, or a card, which faces the cameras, of its `SIZES`."""
+    sizes = zip(SIZES[kind], sizes_mm, strict=True)
+    return {"type": kind} | {name: round(size_mm, 1) for name, size_mm in sizes}
+
+
+def lamp_and_sky(x_mm: float, z_mm: float, lamp_cd_m2: float, sky_cd_m2: float) -> list[Table]:
+    """A broad lamp above what the cameras see, and even light from all around."""
+    lamp = {
+        "type": "area",
+        "position_mm": [x_mm, -430, z_mm],
+        "target_mm": [0, 0, 600],
+        "width_mm": 400,
+        "height_mm": 300,
+        "luminance_cd_m2": lamp_cd_m2,
+    }
+    return [lamp, {"type": "uniform", "luminance_cd_m2": sky_cd_m2}]
+
+
+def any_lights(random: Random, finishes: set[str]) -> list[Table]:
+    """Even light from all around, mostly with a lamp: broad or small, a bulb, a spot, or one far away.
+
+    Gloss and metals make rare and bright paths of the light of a small lamp, and glass does so of any lamp.
+    So lamps are broad where `finishes` has gloss or metals, and there are none with glass.
+    """
+    even_light = {"type": "uniform", "luminance_cd_m2": round(log_uniform(random, 20, 400), 1)}
+    kinds = ["area", "area", "none"]
+    if "glass" in finishes:
+        kinds = ["none"]
+    elif not finishes:
+        kinds += ["point", "spot", "directional"]
+    kind = random.choice(kinds)
+    place, target = (
+        [round(random.uniform(*ends)) for ends in box]
+        for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
+    )
+    lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
+    side, beam = log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
+    if kind == "none":
+        return [even_light]
+    luminance = lux * square_m / (side * side / 1e6)
+    values = {
+        "area": {"width_mm": side, "height_mm": side, "luminance_cd_m2": luminance},
+        "point": {"intensity_cd": lux * square_m},
+        "spot": {"intensity_cd": lux * square_m, "beam_deg": beam, "cutoff_deg": 2 * beam},
+        "directional": {"illuminance_lux": lux},
+    }
+    lamp = {name: round(value, 3) for name, value in values[kind].items()}
+    places = {"position_mm": place, "target_mm": target}
+    if kind == "point":
+        places = {"position_mm": place}
+    elif kind == "directional":
+        places = {"direction": [b - a for a, b in zip(place, target, strict=True)]}
+    tint = random.choice(["D65", "D65", "A", "FL2"])
+    return [even_light, {"type": kind, "illuminant": tint} | lamp | places]
+
+
+def composed(
+    title: str,
     objects: Objects,
-    z_mm: float,
-    material: Material,
-    name: str = "wall",
-    side_mm: float = 1200,
-) -> None:
-    """Add an upright wall that fills the film."""
-    objects.add(name, (0.0, 0.0, z_mm), UPRIGHT, draw.card(side_mm, side_mm), material(random))
-
-
-def add_backwall(random: Random, objects: Objects, farthest_mm: float) -> None:
-    """As often as not, add a wall behind all."""
-    if random.random() >= 0.5:
-        add_wall(random, objects, random.uniform(farthest_mm + 40, 880), large_material, "backwall")
-
-
-def add_room(random: Random, objects: Objects, wall_mm: float, floor_mm: float) -> None:
-    """Add a back wall, mostly a floor and often a side wall or two."""
-    add_wall(random, objects, wall_mm, large_material)
-    middle, long = (wall_mm + 400) / 2, wall_mm - 400
-    if random.random() < 0.8:
-        place, shape = (0.0, floor_mm + 200, middle), draw.box_of(1200, 400, long)
-        objects.add("floor", place, UPRIGHT, shape, large_material(random))
-    for name, side in (("left", -1), ("right", 1)):
-        if random.random() < 0.5:
-            place, shape = (side * random.uniform(150, 270), 0.0, middle), draw.card(long, 1000)
-            objects.add(f"{name}-wall", place, (0.0, 90.0, 0.0), shape, large_material(random))
+    planes_mm: Sequence[float],
+    lights: list[Table],
+    backdrop: Table | None,
+    *,
+    has_meshes: bool = False,
+) -> Scene:
+    """The scene of these parts."""
+    values = {"title": title, "planes_mm": list(planes_mm), "objects": objects, "lights": lights}
+    folder = mesh_folder() if has_meshes else None
+    return scene_of(values if backdrop is None else values | {"backdrop": backdrop}, folder, title)
 
 
 def mesh_folder() -> Path:
@@ -160,24 +201,24 @@ def mesh_of(points: np.ndarray, *sizes_mm: float) -> Table:
     return {"type": "mesh", "file": file.name, "scale": scale if len(scale) > 1 else scale[0]}
 
 
-def rod() -> np.ndarray:
-    """An upright prism of 32 sides, of radius and half length 1, in pieces: rays are slow to trace between
-    the long slivers of which a cylinder consists."""
+def rod_of(radius_mm: float, length_mm: float) -> Table:
+    """An upright prism of 32 sides, in pieces: rays are slow to trace between the long slivers of which a
+    cylinder consists."""
     line = np.array([(0.0, -1.0), *((1.0, height) for height in np.linspace(-1, 1, 41)), (0.0, 1.0)])
-    return _around(line, 32)
+    return mesh_of(_around(line, 32), radius_mm, length_mm / 2, radius_mm)
 
 
 def blob(random: Random) -> np.ndarray:
     """A ball with bumps, stretched: waves over its surface, the shorter the lower."""
     directions = _globe()
     radius = np.ones(directions.shape[:2])
-    strength, roughness = draw.log_uniform(random, 0.05, 0.35), random.uniform(0.8, 1.8)
+    strength, roughness = log_uniform(random, 0.05, 0.35), random.uniform(0.8, 1.8)
     for _ in range(12):
-        frequency = draw.log_uniform(random, 1, 8)
+        frequency = log_uniform(random, 1, 8)
         wave = np.array([random.gauss(0, frequency) for _ in range(3)])
         height = strength * frequency**-roughness
         radius += height * np.sin(directions @ wave + random.uniform(0, 2 * math.pi))
-    stretch = [draw.log_uniform(random, 0.7, 1.3) for _ in range(3)]
+    stretch = [log_uniform(random, 0.7, 1.3) for _ in range(3)]
     return directions * np.maximum(radius, 0.3)[..., None] * stretch
 
 
@@ -206,13 +247,13 @@ def spindle(random: Random) -> np.ndarray:
     kind = random.choice(["cone", "capsule", "annulus", "vase", "vase"])
     along = np.linspace(0, 1, ROWS)
     if kind == "cone":
-        line = np.array([(0.0, -1.2), (draw.log_uniform(random, 0.4, 1), 0.8), (0.0, 0.8)])
+        line = np.array([(0.0, -1.2), (log_uniform(random, 0.4, 1), 0.8), (0.0, 0.8)])
     elif kind == "capsule":
         angle = np.linspace(-math.pi / 2, math.pi / 2, ROWS)
         straight = random.uniform(0.3, 1.2) * np.sign(angle)
         line = 0.6 * np.stack([np.cos(angle), np.sin(angle) + straight], axis=-1)
     elif kind == "annulus":
-        inner, half = random.uniform(0.3, 0.8), draw.log_uniform(random, 0.03, 0.4)
+        inner, half = random.uniform(0.3, 0.8), log_uniform(random, 0.03, 0.4)
         line = np.array([(inner, -half), (1.0, -half), (1.0, half), (inner, half), (inner, -half)])
     else:
         radius = random.uniform(0.35, 0.6) * np.ones(ROWS)
@@ -228,7 +269,7 @@ def spindle(random: Random) -> np.ndarray:
 def tube(random: Random) -> np.ndarray:
     """A ring, round or wavy, a knot or a spring: a circle that goes along a curve."""
     kind = random.choice(["ring", "ring", "wavy", "knot", "spring"])
-    along, thick = np.linspace(0, 2 * math.pi, 4 * ROWS), draw.log_uniform(random, 0.06, 0.4)
+    along, thick = np.linspace(0, 2 * math.pi, 4 * ROWS), log_uniform(random, 0.06, 0.4)
     radius, depth, turns = np.ones_like(along), 0 * along, 1
     if kind == "wavy":
         waves, height = random.randint(3, 8), random.uniform(0.05, 0.2)
