@@ -82,7 +82,12 @@ def write_page(folder: Path, out: Path) -> int:
             for measure in summary.AXES
             if measure in {*cell_means["measure"]}
         },
-        "ranks": dict(_ranks(of_scenes, measure) for measure in summary.DECISIVE),
+        "ranks": {
+            f"{title} over all {summary.ranked_over(of_scenes, measure)}": summary.rank_table(
+                of_scenes, measure
+            )
+            for measure, title in summary.DECISIVE.items()
+        },
         "machines": {
             machine: [method for _, method in group] for machine, group in groupby(pairs, itemgetter(0))
         },
@@ -90,13 +95,6 @@ def write_page(folder: Path, out: Path) -> int:
     }
     write_bytes_safely(out, render_page("benchmark.html.j2", content, script="benchmark.js"))
     return len(submissions)
-
-
-def _ranks(frame: "DataFrame", measure: str) -> tuple[str, "DataFrame"]:
-    """Title and table of the methods ranked by one measure."""
-    unit = summary.ranked_over(frame, measure)
-    table = summary.rank_table(summary.ranks(frame, measure), unit)
-    return f"{summary.DECISIVE[measure]} over all {unit}", table
 
 
 def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:

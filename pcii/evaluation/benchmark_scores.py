@@ -70,7 +70,7 @@ class Submission(BaseModel):
     @property
     def is_run(self) -> bool:
         """Whether the method was run here, and its maps not made elsewhere."""
-        return False
+        return isinstance(self, ScoredSubmission) and self.made == RUN
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -90,11 +90,6 @@ class ScoredSubmission(Submission):
     made: Made
     command_name: Text | None = None
     half: Half
-
-    @property
-    def is_run(self) -> bool:
-        """Whether the method was run here, and its maps not made elsewhere."""
-        return self.made == RUN
 
 
 @dataclass(frozen=True)

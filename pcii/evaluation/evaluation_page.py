@@ -104,13 +104,11 @@ def _tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[st
         means = cell_means[cell_means["measure"] == decisive]
         if not len(means):
             continue
-        unit, ranked = summary.ranked_over(frame, decisive), summary.ranks(frame, decisive)
+        ranked = summary.rank_table(frame, decisive)
         if len(ranked):
-            yield f"{title}, methods compared on the same {unit}", summary.rank_table(ranked, unit)
-        yield (
-            f"{title} by photons per view",
-            summary.mean_table(means, ["scene", "method"], "light", summary.light_name),
-        )
+            yield f"{title}, methods compared on the same {ranked.columns[-1]}", ranked
+        by_light = summary.mean_table(means, ["scene", "method"], "light", summary.light_name)
+        yield f"{title} by photons per view", by_light
         if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
             columns = {each.name: each.column for each in summary.MEASURES if each.of in (task, "both")}
             is_of_task = cell_means["method"].isin(means["method"].unique())

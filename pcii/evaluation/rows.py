@@ -205,7 +205,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     ]
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
-    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
+    # With escapes for parts of names of files that are no characters, which pandas cannot hold.
+    frame[texts] = frame[texts].map(
+        lambda text: text.encode(errors="backslashreplace").decode(), na_action="ignore"
+    )
     numbers = frame.columns.difference([*texts, "light"])
     frame[numbers] = frame[numbers].astype("float64")
     frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
@@ -213,11 +216,6 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     lights = sorted(set(frame["light"]), key=lambda light: (isinstance(light, str), light))
     frame["light"] = pd.Categorical(frame["light"], lights, ordered=True)
     return frame
-
-
-def _encodable(text: str) -> str:
-    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
-    return text.encode(errors="backslashreplace").decode()
 
 
 def _measured(row: Row) -> Iterable[Row]:
