@@ -99,7 +99,12 @@ class Examples(Sequence[Example]):
         entropy = None if self.seed is None else (self.seed, self.epoch, number % len(self))
         rng = np.random.default_rng(entropy)
         pose = _Pose.random(dataset.grid, self.crop_px, self.poses, rng)
-        planes = self._planes_of(dataset, pose.of_grid(dataset.grid))
+        grid = pose.of_grid(dataset.grid)
+        if isinstance(self.planes, int):
+            near_px, far_px = total_disparity_px(grid, np.array(depth_range_of(dataset)))
+            planes = FocalPlanes.at_total_disparity(grid, np.linspace(near_px, far_px, self.planes))
+        else:
+            planes = FocalPlanes.at_depths(grid, self.planes)
         example: Example = {}
         if {*self.fields} - {"truth"}:
             counts = pose.of_counts(dataset.counts)
@@ -117,12 +122,6 @@ class Examples(Sequence[Example]):
                 raise InputError(f"{dataset.path}: has no truth, which the field 'truth' is made of")
             example |= _truth_fields(pose.of_truth(dataset.truth), planes)
         return example
-
-    def _planes_of(self, dataset: Dataset, grid: CameraGrid) -> FocalPlanes:
-        if not isinstance(self.planes, int):
-            return FocalPlanes.at_depths(grid, self.planes)
-        near_px, far_px = total_disparity_px(grid, np.array(depth_range_of(dataset)))
-        return FocalPlanes.at_total_disparity(grid, np.linspace(near_px, far_px, self.planes))
 
 
 @dataclass(frozen=True)

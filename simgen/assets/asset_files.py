@@ -84,20 +84,15 @@ def read_texture(path: Path, *, for_gltf: bool = False) -> np.ndarray:
         pixels = picture.pixels[0]
     else:
         (pixels,) = decode(replace(picture, orientation=UPRIGHT))
-        pixels = _turn_upright(pixels, picture.orientation)
+        # From 5 on its rows are columns; then either may run backwards.
+        turned = pixels.swapaxes(0, 1) if 5 <= picture.orientation <= 8 else pixels
+        up, left = picture.orientation in (3, 4, 7, 8), picture.orientation in (2, 3, 6, 7)
+        pixels = turned[:: -1 if up else 1, :: -1 if left else 1]
     if picture.dtype == np.bool_ or picture.bits is not None:
         pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
     if picture.shape[2] == 1:
         pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=2), pixels[..., 1:]], axis=2)
     return pixels
-
-
-def _turn_upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Pixels of a file upright: from 5 on its rows are columns; then either may run backwards."""
-    if 5 <= orientation <= 8:
-        pixels = pixels.swapaxes(0, 1)
-    up, left = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
-    return pixels[:: -1 if up else 1, :: -1 if left else 1]
 
 
 def read_environment(path: Path) -> np.ndarray:

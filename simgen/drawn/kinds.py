@@ -88,7 +88,7 @@ def _side_by_side(
     high_mm: float = 25,
 ) -> Scene:
     """From left to right; the first of two or of three is at `first_mm`, up or down by at most `high_mm`."""
-    planes = _planes_apart(random, random.choice([2, 2, 3]))
+    planes = _planes_apart(random)
     objects, x = Objects(), first_mm[len(planes) - 2]
     for position, z in enumerate(random.sample(planes, len(planes))):
         scale, radius = z / REFERENCE_MM, random.uniform(*radius_mm)
@@ -120,7 +120,7 @@ def drawn_cards(random: Random) -> Scene:
 
 def drawn_room(random: Random) -> Scene:
     """Two or three solids before a wall of detail, on a desk or not: the film is bright all over."""
-    planes, wall = _planes_apart(random, random.choice([2, 2, 3])), 760
+    planes, wall = _planes_apart(random), 760
     objects = Objects()
     for position, z in enumerate(planes):
         radius, scale = random.uniform(26, 42), z / REFERENCE_MM
@@ -251,8 +251,9 @@ def _drawn_scene(
     return parts.composed(title, objects, planes_mm, lights, backdrop)
 
 
-def _planes_apart(random: Random, count: int) -> list[int]:
-    """`count` depths, in mm, well apart."""
+def _planes_apart(random: Random) -> list[int]:
+    """Two or three depths, in mm, well apart."""
+    count = random.choice([2, 2, 3])
     while True:
         planes: list[int] = sorted(random.sample(PLANES_MM, count))
         if all(far - near >= MIN_DEPTH_GAP_MM for near, far in pairwise(planes)):

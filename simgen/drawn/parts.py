@@ -261,8 +261,10 @@ def spindle(random: Random) -> np.ndarray:
             radius += random.uniform(-0.25, 0.25) / number * np.cos(number * math.pi * along)
         side = np.stack([np.maximum(radius, 0.12), 2 * along - 1], axis=-1)
         line = np.concatenate([[(0.0, -1.0)], side, [(0.0, 1.0)]])
-    if len(line) < ROWS:
-        line = _evenly(line)
+    if len(line) < ROWS:  # as many points, evenly along it
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        even = np.linspace(0, length[-1], ROWS)
+        line = np.stack([np.interp(even, length, part) for part in line.T], axis=-1)
     return _around(line, COLUMNS)
 
 
@@ -310,13 +312,6 @@ def _globe() -> np.ndarray:
         np.linspace(-math.pi, math.pi, COLUMNS + 1), np.linspace(-math.pi / 2, math.pi / 2, ROWS)
     )
     return np.stack([np.sin(east) * np.cos(south), np.sin(south), -np.cos(east) * np.cos(south)], axis=-1)
-
-
-def _evenly(line: np.ndarray) -> np.ndarray:
-    """`ROWS` points evenly along a line (N, 2)."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    even = np.linspace(0, length[-1], ROWS)
-    return np.stack([np.interp(even, length, part) for part in line.T], axis=-1)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

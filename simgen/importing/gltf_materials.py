@@ -90,7 +90,11 @@ class Surface:
         document = self.gltf.document
         texture = self.gltf.item(document.textures, info.index, "textures")
         texcoord = info.tex_coord if info.other_tex_coord is None else info.other_tex_coord
-        uv_matrix, reason = _uv_matrix(info), ""
+        # KHR_texture_transform: scaled, turned counterclockwise as one looks at the picture, moved.
+        (x, y), (width, height) = info.uv_offset, info.uv_scale
+        c, s = np.cos(info.uv_rotation), np.sin(info.uv_rotation)
+        uv_matrix = np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
+        reason = ""
         if not self.with_pictures:
             reason = "pictures on meshes without texture coordinates for them"
         elif texture.source is None:
@@ -192,13 +196,6 @@ class Surface:
             # White of the new picture has the luminance of the strongest factor.
             file = self._keep("emission", _tinted(pixels[..., :3], rgb_cd_m2 / rgb_cd_m2.max()))
             self.values["emission"] = {"luminance_cd_m2": float(rgb_cd_m2.max()), "texture": file}
-
-
-def _uv_matrix(info: TextureInfo) -> np.ndarray:
-    """KHR_texture_transform: scaled, turned counterclockwise as one looks at the picture, moved."""
-    (x, y), (width, height) = info.uv_offset, info.uv_scale
-    c, s = np.cos(info.uv_rotation), np.sin(info.uv_rotation)
-    return np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
 
 
 def _tinted(pixels: np.ndarray, factor: np.ndarray) -> np.ndarray:
