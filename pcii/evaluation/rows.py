@@ -218,6 +218,11 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     return frame
 
 
+def by_scene(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose datasets belong to one scene of the frame if their titles are the same, in any light."""
+    return [row | {"recipe": row["title"]} for row in rows]
+
+
 def _measured(row: Row) -> Iterable[Row]:
     """A record of depth, or one for each plane, with its scores against both kinds of truth."""
     if "depth" in row:

@@ -320,7 +320,7 @@ def light_name(light: float | str) -> str:
     return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
 
 
-def _lines_of(table: "DataFrame") -> list[Any]:
+def lines_of(table: "DataFrame") -> list[Any]:
     """The rows of a table, each with its columns as attributes."""
     return list(table.itertuples())
 
@@ -352,7 +352,7 @@ def mean_table(
     is_best = (values == best_of(values)) & (values > -best_of(-values))
     is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
     texts: list[str] = []
-    for row in _lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
+    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
         number = f" of {row.n}" if row.n < full_n else ""
         text = _with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
         texts.append(emphasised(text) if row.is_best else text)
@@ -376,7 +376,7 @@ def rank_table(frame: "DataFrame", measure: str) -> "DataFrame":
             *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
             str(row.n),
         )
-        for row in _lines_of(ranks(frame, measure))
+        for row in lines_of(ranks(frame, measure))
     ]
     header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible")
     return text_table(rows, (*header, ranked_over(frame, measure)))
