@@ -5,11 +5,13 @@ ranks, as texts, for terminals too.
 """
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pcii.base import InputError, sweep_temporaries, write_bytes_safely
 from pcii.evaluation import summary
@@ -21,17 +23,27 @@ from pcii.evaluation.method_names import (
     read_submission,
 )
 from pcii.evaluation.rows import Row, by_scene, frame_of, read_rows
-from pcii.figures import NOT_KNOWN, accuracy_chart, calibration_chart, figure_uri, render_page, text_table
+from pcii.figures import (
+    NOT_KNOWN,
+    accuracy_chart,
+    calibration_chart,
+    emphasised,
+    figure_uri,
+    render_page,
+    text_table,
+)
 from pcii.store import EVALUATION_FOLDER, IN_FRAMES, ROWS, hash_file, list_files, verify
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame, Series
 
 MAX_DETAILED_SCENES = 12
 """Largest number of scenes with tables of all measures: a page with those of more is too large to load."""
 
 TYPICAL_PHOTONS = 1000.0
 """Photons per view at which scenes and times are compared: those of the paper."""
+NOT_BETTER = "†"
+"""Mark of a mean that is no better than the best of `summary.SIMPLE` for the same scene and light."""
 MIN_PX = 1e-3
 """Smaller errors of depth count as this one where they are averaged as logarithms."""
 GEOMETRIC: Mapping[str, summary.Kind] = {"median_px": "geometric"}
@@ -111,7 +123,7 @@ def _calibration_plot(table: "DataFrame", methods: Sequence[str]) -> str:
         return ""
     bins = bins.pivot(index=["method", "light", "bin"], columns="part", values="mean").reset_index()
     bins = bins.dropna(subset="confidence").sort_values(["light", "method"], kind="stable")
-    return figure_uri(calibration_chart(bins.assign(light=bins["light"].map(summary.light_name)), methods))
+    return figure_uri(calibration_chart(bins.assign(light=bins["light"].map(light_name)), methods))
 
 
 def _tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[str, "DataFrame"]]:
@@ -125,17 +137,17 @@ def _tables_of(frame: "DataFrame", cell_means: "DataFrame") -> Iterator[tuple[st
         means = cell_means[cell_means["measure"] == decisive]
         if not len(means):
             continue
-        ranked = summary.rank_table(frame, decisive)
+        ranked = _rank_table(frame, decisive)
         if len(ranked):
             yield f"{title}, methods compared on the same {ranked.columns[-1]}", ranked
-        by_light = summary.mean_table(means, ["scene", "method"], "light", summary.light_name)
+        by_light = _mean_table(means, ["scene", "method"], "light", light_name)
         yield f"{title} by photons per view", by_light
         if frame["scene"].nunique() <= MAX_DETAILED_SCENES:
             columns = {each.name: each.column for each in summary.MEASURES if each.of in (task, "both")}
             is_of_task = cell_means["method"].isin(means["method"].unique())
             shown = cell_means[cell_means["measure"].isin([*columns]) & is_of_task]
             shown = shown.assign(measure=pd.Categorical(shown["measure"], [*columns]))
-            table = summary.mean_table(shown, ["scene", "light", "method"], "measure", columns.__getitem__)
+            table = _mean_table(shown, ["scene", "light", "method"], "measure", columns.__getitem__)
             yield f"{title} beside other measures", table
 
 
@@ -146,7 +158,7 @@ def decisive_means(cell_means: "DataFrame") -> Iterator[tuple[str, str]]:
         of_measure = means[means["measure"] == measure]
         if len(of_measure):
             table = of_measure.pivot(index="method", columns="light", values="mean").sort_index(axis=1)
-            table = table.rename(columns=summary.light_name).rename_axis(index=None, columns=None)
+            table = table.rename(columns=light_name).rename_axis(index=None, columns=None)
             yield title, table.to_string(float_format="{:.3f}".format, na_rep=NOT_KNOWN)
 
 
@@ -199,9 +211,7 @@ def write_page(folder: Path, out: Path) -> int:
             if measure in {*cell_means["measure"]}
         },
         "ranks": {
-            f"{title} over all {summary.ranked_over(of_scenes, measure)}": summary.rank_table(
-                of_scenes, measure
-            )
+            f"{title} over all {summary.ranked_over(of_scenes, measure)}": _rank_table(of_scenes, measure)
             for measure, title in summary.DECISIVE.items()
         },
         "machines": {
@@ -225,21 +235,19 @@ def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:
     accuracy = over_scenes[over_scenes["measure"] == measure]
     is_time = (over_scenes["measure"] == "seconds") & (over_scenes["light"] == TYPICAL_PHOTONS)
     times = over_scenes[is_time].assign(column=f"seconds at {TYPICAL_PHOTONS:g}")
-    by_light = pd.concat(
-        [accuracy.assign(column=accuracy["light"].map(summary.light_name).astype(object)), times]
-    )
-    columns = [*map(summary.light_name, accuracy["light"].unique()), *times["column"].unique()]
+    by_light = pd.concat([accuracy.assign(column=accuracy["light"].map(light_name).astype(object)), times])
+    columns = [*map(light_name, accuracy["light"].unique()), *times["column"].unique()]
     by_light["column"] = pd.Categorical(by_light["column"], columns)
     at_typical = values[(values["measure"] == measure) & (values["light"] == TYPICAL_PHOTONS)]
     tables: dict[str, DataFrame] = {}
     if len(by_light):
         full_n = of_scenes["scene"].nunique()
-        tables["By photons per view"] = summary.mean_table(
+        tables["By photons per view"] = _mean_table(
             by_light, ["method"], "column", full_n=full_n, bound=BOUND
         )
     if len(at_typical):
         title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
-        tables[title] = summary.mean_table(at_typical, ["scene"], "method", bound=BOUND)
+        tables[title] = _mean_table(at_typical, ["scene"], "method", bound=BOUND)
     chart = _accuracy_plot(over_scenes, list(values["method"].cat.categories), measure)
     return {"chart": chart, "tables": tables}
 
@@ -280,3 +288,77 @@ def _submission_table(submissions: Mapping[Path, ScoredSubmission], frame: "Data
             rows.append((method, *texts, str(scores[method]), command))
     header = ("method", "authors", "url", "trained on", "scores", "command")
     return text_table(sorted(rows), header, words=4)
+
+
+def _with_interval(mean: float, low: float, high: float) -> str:
+    """A mean with its interval, if it has one, as text; a dash for NaN."""
+    if np.isnan(mean):
+        return NOT_KNOWN
+    return f"{mean:.3f}" if np.isnan(low) else f"{mean:.3f} ({low:.3f} to {high:.3f})"
+
+
+def light_name(light: float | str) -> str:
+    """A light of the frame as the name of a column or plot: "300", "full light"."""
+    return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
+
+
+def lines_of(table: "DataFrame") -> list[Any]:
+    """The rows of a table, each with its columns as attributes."""
+    return list(table.itertuples())
+
+
+def _mean_table(
+    means: "DataFrame",
+    rows: Sequence[str],
+    column: str,
+    name: Callable[[Any], str] = str,
+    full_n: int = 0,
+    bound: str = "",
+) -> "DataFrame":
+    """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
+
+    Of `summary.MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where
+    another is worse, and `NOT_BETTER` marks those that are no better than the best of `summary.SIMPLE`;
+    `bound` names what is no method. Means of fewer than `full_n` values have their number.
+    """
+    import pandas as pd
+
+    contest = [key for key in ("scene", "light", "measure") if key in means]
+    methods = means["method"].astype(object)
+    is_simple = methods.isin(summary.SIMPLE)
+    values = means["mean"].where(means["measure"].isin(summary.MORE_IS_BETTER) & (methods != bound))
+
+    def best_of(some: "Series") -> "Series":
+        return some.groupby([means[key] for key in contest], observed=True).transform("max")
+
+    is_best = (values == best_of(values)) & (values > -best_of(-values))
+    is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
+    texts: list[str] = []
+    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
+        number = f" of {row.n}" if row.n < full_n else ""
+        text = _with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
+        texts.append(emphasised(text) if row.is_best else text)
+    cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
+    table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
+    table = table.fillna(NOT_KNOWN).set_axis([*map(name, table.columns)], axis="columns").reset_index()
+    if "light" in table:
+        table["light"] = [*map(light_name, table["light"])]
+    return table.set_index([*rows])
+
+
+def _rank_table(frame: "DataFrame", measure: str) -> "DataFrame":
+    """Methods as `ranks` has them by default, as texts."""
+    rows = [
+        (
+            row.method,
+            light_name(row.light),
+            str(row.rank),
+            _with_interval(row.mean, row.low, row.high),
+            _with_interval(row.difference, row.difference_low, row.difference_high),
+            *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
+            str(row.n),
+        )
+        for row in lines_of(summary.ranks(frame, measure))
+    ]
+    header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible")
+    return text_table(rows, (*header, summary.ranked_over(frame, measure)))

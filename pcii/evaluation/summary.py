@@ -1,11 +1,11 @@
-"""The measures of an evaluation, their means with intervals, comparisons of methods, and tables of texts.
+"""The measures of an evaluation, their means with intervals, and comparisons of methods.
 
 All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
 alone are one scene. Yardsticks look at no photon.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from pcii.base import InputError
 from pcii.depth import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.rows import HEAD
-from pcii.figures import NOT_KNOWN, PLACES, emphasised, text_table
+from pcii.figures import PLACES
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -28,8 +28,6 @@ RANDOM_FLIPS = 10_000
 MIN_SCENES = 2
 """One scene has no spread over scenes."""
 CELL = ("scene", "light", "method")
-NOT_BETTER = "†"
-"""Mark of a mean that is no better than the best of `SIMPLE` for the same scene and light."""
 
 
 class Measure(NamedTuple):
@@ -306,77 +304,3 @@ def accuracies(table: "DataFrame", measure: str) -> "DataFrame":
         places = table[table["measure"] == name].set_index(["method", "light"])["mean"]
         cells[name] = places.reindex(cells.index)
     return cells.reset_index()
-
-
-def _with_interval(mean: float, low: float, high: float) -> str:
-    """A mean with its interval, if it has one, as text; a dash for NaN."""
-    if np.isnan(mean):
-        return NOT_KNOWN
-    return f"{mean:.3f}" if np.isnan(low) else f"{mean:.3f} ({low:.3f} to {high:.3f})"
-
-
-def light_name(light: float | str) -> str:
-    """A light of the frame as the name of a column or plot: "300", "full light"."""
-    return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
-
-
-def lines_of(table: "DataFrame") -> list[Any]:
-    """The rows of a table, each with its columns as attributes."""
-    return list(table.itertuples())
-
-
-def mean_table(
-    means: "DataFrame",
-    rows: Sequence[str],
-    column: str,
-    name: Callable[[Any], str] = str,
-    full_n: int = 0,
-    bound: str = "",
-) -> "DataFrame":
-    """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
-
-    Of `MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where another
-    is worse, and `NOT_BETTER` marks methods that are no better than the best of `SIMPLE`; `bound`
-    names what is no method. Means of fewer than `full_n` values have their number.
-    """
-    import pandas as pd
-
-    contest = [key for key in ("scene", "light", "measure") if key in means]
-    methods = means["method"].astype(object)
-    is_simple = methods.isin(SIMPLE)
-    values = means["mean"].where(means["measure"].isin(MORE_IS_BETTER) & (methods != bound))
-
-    def best_of(some: "Series") -> "Series":
-        return some.groupby([means[key] for key in contest], observed=True).transform("max")
-
-    is_best = (values == best_of(values)) & (values > -best_of(-values))
-    is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
-    texts: list[str] = []
-    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
-        number = f" of {row.n}" if row.n < full_n else ""
-        text = _with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
-        texts.append(emphasised(text) if row.is_best else text)
-    cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
-    table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
-    table = table.fillna(NOT_KNOWN).set_axis([*map(name, table.columns)], axis="columns").reset_index()
-    if "light" in table:
-        table["light"] = [*map(light_name, table["light"])]
-    return table.set_index([*rows])
-
-
-def rank_table(frame: "DataFrame", measure: str) -> "DataFrame":
-    """Methods as `ranks` has them by default, as texts."""
-    rows = [
-        (
-            row.method,
-            light_name(row.light),
-            str(row.rank),
-            _with_interval(row.mean, row.low, row.high),
-            _with_interval(row.difference, row.difference_low, row.difference_high),
-            *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
-            str(row.n),
-        )
-        for row in lines_of(ranks(frame, measure))
-    ]
-    header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible")
-    return text_table(rows, (*header, ranked_over(frame, measure)))
