@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import LUMINANCE, InputError, linear_to_srgb
-from simgen.base import cached, not_installed, suggestion
+from simgen.base import asset, cached, not_installed, suggestion
 
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """From CIE XYZ to linear sRGB."""
@@ -25,7 +25,6 @@ DAYLIGHT = "D65"
 """The white of sRGB."""
 CHART = "ColorChecker N Ohta"
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
-MAX_CSV_BYTES = 1 << 20
 CSV_HEAD = ["wavelength_nm", "R", "G", "B"]
 KINDS = OBSERVERS, ILLUMINANTS, PATCHES = "observers", "illuminants", "patches"
 
@@ -161,7 +160,7 @@ def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
     wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
     """
     if camera.lower().endswith(".csv"):
-        wavelength_nm, curves = _read_csv(recipe_folder / camera)
+        wavelength_nm, curves = _read_csv(asset(recipe_folder, camera, "sensor.camera"))
         rows = np.array([np.interp(WAVELENGTH_NM, wavelength_nm, row, left=0, right=0) for row in curves.T])
     else:
         table = colour_science().MSDS_CAMERA_SENSITIVITIES
@@ -175,13 +174,11 @@ def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
 
 def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Wavelengths (M,) in nm and sensitivities (M, 3) or (M, 1)."""
-    if not path.is_file() or path.stat().st_size > MAX_CSV_BYTES:
-        raise InputError(f"sensor.camera: there is no file {path} of at most {MAX_CSV_BYTES} bytes")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
         table = np.array(rows, dtype=np.float64)
-    except (OSError, ValueError, csv.Error):
+    except (ValueError, csv.Error):
         head, table = [], np.zeros((0, 0))
     is_head = head == CSV_HEAD or (len(head) == 2 and head[0] == CSV_HEAD[0])
     is_table = is_head and table.ndim == 2 and table.shape[1] == len(head) and np.isfinite(table).all()
