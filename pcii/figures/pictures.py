@@ -187,13 +187,6 @@ def map_image(
     return image
 
 
-def depth_image(
-    z_mm: np.ndarray, near_mm: float, far_mm: float, confidence: np.ndarray | None = None
-) -> np.ndarray:
-    """Depth (H, W) from near (yellow) to far (violet), paler where less sure, grey where not finite."""
-    return map_image(z_mm, DEPTH_COLOURS, (near_mm, far_mm), confidence)
-
-
 def write_png(path: Path, image: np.ndarray) -> None:
     """Write an 8-bit RGB image (H, W, 3)."""
     write_bytes_safely(path, _file_bytes(image, "PNG", optimize=True))

@@ -33,18 +33,11 @@ SIZES = {
     "card": ("width_mm", "height_mm"),
 }
 ROWS, COLUMNS = 64, 128
-HEADER = """ply
-format binary_little_endian 1.0
-element vertex {vertices}
-property float x
-property float y
-property float z
-property float s
-property float t
-element face {faces}
-property list uchar int vertex_indices
-end_header
-"""
+HEADER = (
+    "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n"
+    + "".join(f"property float {name}\n" for name in "xyzst")
+    + "element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+)
 
 
 def log_uniform(random: Random, low: float, high: float) -> float:
