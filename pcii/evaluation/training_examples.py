@@ -241,7 +241,10 @@ def _of_split(
         ends = np.cumsum(shares)
         of_scene = by == "scene"
         keys = [(r.get("scene"), r.get("scene_number")) if of_scene else r.get("seed") for r in rows]
-        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key), "right")), 2)] for key in keys]
+        # Numbers from 0 to 1 that are the same for a key on every machine.
+        digests = [hashlib.sha256(repr(key).encode()).digest() for key in keys]
+        places = [int.from_bytes(digest[:8], "big") / 2**64 for digest in digests]
+        splits = [SPLITS[min(int(place), 2)] for place in np.searchsorted(ends, places, "right")]
     elif None in splits:
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
     mask = [each == split for each in splits]
@@ -249,8 +252,3 @@ def _of_split(
         other = "scene" if by == "seed" else "seed"
         raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by={other!r}")
     return data[mask] if is_collection else [*compress(data, mask)]
-
-
-def _hashed(key: object) -> float:
-    """A number from 0 to 1 that is the same for a key on every machine."""
-    return int.from_bytes(hashlib.sha256(repr(key).encode()).digest()[:8], "big") / 2**64

@@ -1,8 +1,4 @@
-"""Arrays as 8-bit sRGB pictures, and their files.
-
-Photons and light are shown in blocks, smoothed where photons are few, and several images at one exposure;
-masks, depth and errors have fixed colours.
-"""
+"""Arrays as 8-bit sRGB pictures, and their files."""
 
 import base64
 import io

@@ -145,6 +145,11 @@ class Surface:
         clear, coat = self._pixels(material.transmission_texture), self._pixels(material.clearcoat_texture)
         # The gloss with the same GGX alpha: ours goes from 0.1 to 0.001 linearly, theirs is roughness^2.
         gloss = float(np.clip((0.1 - material.clearcoat_roughness**2) / 0.099, 0, 1))
+        # The index whose highlights are as strong as index and specular factor of the file make them. By
+        # KHR_materials_ior 0 is the largest of all.
+        index = max(material.ior, 1.0) if material.ior else MOST_INDEX
+        amplitude = (index - 1) / (index + 1) * np.sqrt(material.specular_factor)
+        index = float(np.clip((1 + amplitude) / (1 - amplitude), LEAST_INDEX, MOST_INDEX))
         return {
             "type": "principled",
             "metallic": self._share("metallic", material.metallic_factor, packed, 2),
@@ -152,7 +157,7 @@ class Surface:
             "transmission": self._share("transmission", material.transmission_factor, clear, 0),
             "clearcoat": self._share("clearcoat", material.clearcoat_factor, coat, 0),
             "clearcoat_gloss": round(gloss, 6),
-            "refractive_index": self._refractive_index(),
+            "refractive_index": round(index, 6),
         }
 
     def _share(self, what: str, factor: float, pixels: np.ndarray | None, channel: int) -> float | str:
@@ -161,13 +166,6 @@ class Surface:
         if np.ptp(shares) == 0:
             return round(float(shares.flat[0]), 6)
         return self._keep(what, _stored(shares))
-
-    def _refractive_index(self) -> float:
-        """The index whose highlights are as strong as index and specular factor of the file make them."""
-        # By KHR_materials_ior 0 is the largest of all.
-        index = max(self.material.ior, 1.0) if self.material.ior else MOST_INDEX
-        amplitude = (index - 1) / (index + 1) * np.sqrt(self.material.specular_factor)
-        return round(float(np.clip((1 + amplitude) / (1 - amplitude), LEAST_INDEX, MOST_INDEX)), 6)
 
     def _add_normals(self) -> None:
         info = self.material.normal_texture
