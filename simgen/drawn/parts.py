@@ -130,10 +130,8 @@ def any_lights(random: Random, finishes: set[str]) -> list[Table]:
     elif not finishes:
         kinds += ["point", "spot", "directional"]
     kind = random.choice(kinds)
-    place, target = (
-        [round(random.uniform(*ends)) for ends in box]
-        for box in (((-140, 140), (-430, -220), (0, 420)), ((-80, 80), (-60, 60), (480, 720)))
-    )
+    place = [round(random.uniform(*ends)) for ends in ((-140, 140), (-430, -220), (0, 420))]
+    target = [round(random.uniform(*ends)) for ends in ((-80, 80), (-60, 60), (480, 720))]
     lux, square_m = log_uniform(random, 100, 3000), math.dist(place, target) ** 2 / 1e6
     side, beam = log_uniform(random, 300 if finishes else 40, 400), random.uniform(3, 25)
     if kind == "none":
