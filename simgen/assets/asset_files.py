@@ -191,20 +191,18 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
     left out; others, such as curved surfaces, are refused.
     """
     libraries: list[str] = []
-    groups: dict[tuple[str, str], int] = {}
-    group, material, owners = "", "", list[int]()
+    group, material = "", ""
     points: dict[str, list[list[float]]] = {"v": [], "vt": [], "vn": []}
-    corners: list[list[int]] = []
-    counts: list[int] = []
+    faces: dict[tuple[str, str], tuple[list[list[int]], list[int]]] = {}
     text = data.decode("latin-1").replace("\\\r\n", " ").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), start=1):
         keyword, *words = line.split("#", 1)[0].split() or [""]
         try:
-            if keyword == "f":
+            if keyword == "f" and words:
                 sizes = [len(values) for values in points.values()]
+                corners, counts = faces.setdefault(("", "") if as_one else (group, material), ([], []))
                 corners += [_corner(word, sizes) for word in words]
                 counts.append(len(words))
-                owners.append(groups.setdefault(("", "") if as_one else (group, material), len(groups)))
             elif keyword in ("o", "g"):
                 group = " ".join(words)
             elif keyword == "usemtl":
@@ -221,15 +219,13 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
                 raise ValueError
         except ValueError:
             raise ValueError(f"has a line {number} that cannot be used: {line.strip()[:60]!r}") from None
-    if not corners:
+    if not faces:
         raise ValueError("has no faces")
-    owner, number_of, all_corners = np.array(owners), np.array(counts), np.array(corners).reshape(-1, 3)
     values = [np.array(one) for one in points.values()]
-    parts = {}
-    for name, group in groups.items():
-        triples = all_corners[np.repeat(owner == group, number_of)]
-        parts[name] = _obj_mesh(values, triples, number_of[owner == group])
-    return libraries, parts
+    return libraries, {
+        name: _obj_mesh(values, np.array(corners), np.array(counts))
+        for name, (corners, counts) in faces.items()
+    }
 
 
 def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray) -> Triangles:
