@@ -242,12 +242,10 @@ def _compare(measure: str, cell_means: "DataFrame") -> dict[str, Any]:
     tables: dict[str, DataFrame] = {}
     if len(by_light):
         full_n = of_scenes["scene"].nunique()
-        tables["By photons per view"] = _mean_table(
-            by_light, ["method"], "column", full_n=full_n, bound=BOUND
-        )
+        tables["By photons per view"] = _mean_table(by_light, ["method"], "column", full_n=full_n)
     if len(at_typical):
         title = f"By scene, at {TYPICAL_PHOTONS:g} photons per view"
-        tables[title] = _mean_table(at_typical, ["scene"], "method", bound=BOUND)
+        tables[title] = _mean_table(at_typical, ["scene"], "method")
     chart = _accuracy_plot(over_scenes, list(values["method"].cat.categories), measure)
     return {"chart": chart, "tables": tables}
 
@@ -308,25 +306,20 @@ def lines_of(table: "DataFrame") -> list[Any]:
 
 
 def _mean_table(
-    means: "DataFrame",
-    rows: Sequence[str],
-    column: str,
-    name: Callable[[Any], str] = str,
-    full_n: int = 0,
-    bound: str = "",
+    means: "DataFrame", rows: Sequence[str], column: str, name: Callable[[Any], str] = str, full_n: int = 0
 ) -> "DataFrame":
     """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
 
     Of `summary.MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where
     another is worse, and `NOT_BETTER` marks those that are no better than the best of `summary.SIMPLE`;
-    `bound` names what is no method. Means of fewer than `full_n` values have their number.
+    `BOUND` is no method. Means of fewer than `full_n` values have their number.
     """
     import pandas as pd
 
     contest = [key for key in ("scene", "light", "measure") if key in means]
     methods = means["method"].astype(object)
     is_simple = methods.isin(summary.SIMPLE)
-    values = means["mean"].where(means["measure"].isin(summary.MORE_IS_BETTER) & (methods != bound))
+    values = means["mean"].where(means["measure"].isin(summary.MORE_IS_BETTER) & (methods != BOUND))
 
     def best_of(some: "Series") -> "Series":
         return some.groupby([means[key] for key in contest], observed=True).transform("max")
