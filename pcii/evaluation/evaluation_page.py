@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 MAX_DETAILED_SCENES = 12
 """Largest number of scenes with tables of all measures: a page with those of more is too large to load."""
-
 TYPICAL_PHOTONS = 1000.0
 """Photons per view at which scenes and times are compared: those of the paper."""
 NOT_BETTER = "†"
