@@ -18,7 +18,7 @@ from benchmarks.page import table_markdown
 from pcii.base import Stages
 from pcii.depth import PosteriorDepth, depth_map_of
 from pcii.evaluation import NamedMethod, find_datasets, tasks_of
-from pcii.evaluation.summary import light_name
+from pcii.evaluation.evaluation_page import light_name
 from pcii.figures import text_table
 from pcii.removal import masks_of
 from pcii.sections import depth_range_of, planes_of

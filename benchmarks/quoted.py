@@ -17,9 +17,8 @@ from benchmarks.results import UNITS, Record, Value, value_of
 from benchmarks.studies import photon_costs
 from pcii.base import InputError, write_bytes_safely, write_json_safely
 from pcii.evaluation import SUBMISSION, frame_of, means, means_over_scenes, read_rows
-from pcii.evaluation.benchmark_scores import by_scene
-from pcii.evaluation.rows import origin_of
-from pcii.evaluation.summary import lines_of
+from pcii.evaluation.evaluation_page import lines_of
+from pcii.evaluation.rows import by_scene, origin_of
 from pcii.store import IN_FRAMES, own_software
 
 if TYPE_CHECKING:

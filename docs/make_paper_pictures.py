@@ -14,7 +14,15 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 import pcii
-from pcii.figures import depth_image, filled_means, smoothed, smoothing_for, to_srgb8, white_level
+from pcii.figures import (
+    DEPTH_COLOURS,
+    filled_means,
+    map_image,
+    smoothed,
+    smoothing_for,
+    to_srgb8,
+    white_level,
+)
 from pcii.metrics import TrueFocus
 from pcii.types import colour_index
 
@@ -99,9 +107,9 @@ def draw_overview(data: pcii.Dataset, truth: pcii.Truth) -> None:
         panel(place(row, 1), section[PART], f"Section at {z:g} mm")
         in_focus = np.where(focus.in_focus[row][..., None], section, 0)
         panel(place(row, 2), in_focus[PART], f"In focus at {z:g} mm: IoU {iou[z]:.2f}")
-    depth_picture = depth_image(depth.z_mm, NEAR_MM, FAR_MM, depth.confidence)
+    depth_picture = map_image(depth.z_mm, DEPTH_COLOURS, (NEAR_MM, FAR_MM), depth.confidence)
     panel(place(0, 3), depth_picture[PART], f"Depth: median error {score.depth['median_mm']:.1f} mm")
-    true = depth_image(np.where(truth.object_id > 0, truth.z_mm, np.nan), NEAR_MM, FAR_MM)
+    true = map_image(np.where(truth.object_id > 0, truth.z_mm, np.nan), DEPTH_COLOURS, (NEAR_MM, FAR_MM))
     last = place(1, 3)
     panel(last, true[PART], "True depth")
     for number in truth.names:

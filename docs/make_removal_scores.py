@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from pcii.evaluation import SUBMISSION, frame_of, means, read_rows
-from pcii.evaluation.benchmark_scores import by_scene
+from pcii.evaluation.rows import by_scene
 from pcii.evaluation.summary import with_yardsticks
 from pcii.figures.charts import COLOURS, MARKERS, quiet_grid
 from pcii.store import IN_FRAMES

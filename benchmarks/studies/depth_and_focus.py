@@ -13,8 +13,9 @@ from benchmarks.results import Measured, Parameter, Row, Size, Study, Value, val
 from benchmarks.scenes import film
 from pcii.base import Stages
 from pcii.evaluation import depth_name, evaluate, means
+from pcii.evaluation.evaluation_page import lines_of
 from pcii.evaluation.method_names import estimator_of, methods_for
-from pcii.evaluation.summary import SWEEPS, lines_of
+from pcii.evaluation.summary import SWEEPS
 from simgen.dataset import generate_collection
 from simgen.spec import load_sweep
 

@@ -15,16 +15,26 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar, get_args
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError, model_validator
 
 from pcii.base import THIS_PROCESS, Executor, InputError, Report, silent, write_json_safely
 from pcii.evaluation.comparison import Evaluation, EvaluationJob, Task, measure, tasks_of
 from pcii.evaluation.evaluation_page import write_evaluation
-from pcii.evaluation.method_names import NamedMethod, check_name, depth_name, estimator_of, named_method
-from pcii.evaluation.rows import Row, frame_of, origin_of, writing_rows
+from pcii.evaluation.method_names import (
+    RUN,
+    SCORED,
+    SUBMISSION,
+    NamedMethod,
+    ScoredSubmission,
+    Submission,
+    depth_name,
+    estimator_of,
+    named_method,
+    read_submission,
+)
+from pcii.evaluation.rows import by_scene, frame_of, origin_of, writing_rows
 from pcii.sections import planes_of, reconstruct
 from pcii.store import (
     BENCHMARK_FIELDS,
@@ -33,68 +43,15 @@ from pcii.store import (
     Collection,
     Dataset,
     Half,
-    first_fault,
     is_collection,
     open_collection,
     validated,
 )
 from pcii.types import FULL_LIGHT, DepthMap, Light, Segmented
 
-TYPICAL_PHOTONS = 1000.0
-"""Photons per view at which scenes and times are compared: those of the paper."""
-SUBMISSION = "submission.json"
 DEPTH_MAP, MASKS = "depth.npz", "masks.npz"
 MIN_MM, MAX_MM = 1e-3, 1e12
 """Nearest and farthest depth of an answer: errors of others overflow."""
-Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
-RUN, SCORED = get_args(Made)
-Text = Annotated[str, StringConstraints(min_length=1)]
-AnySubmission = TypeVar("AnySubmission", bound="Submission")
-
-
-class Submission(BaseModel):
-    """What submission.json says: the benchmark, the name of the method, and more if its authors like.
-
-    The name is without `depth:`, and new for masks and for depth. The page shows `url` as text, no link.
-    """
-
-    model_config = ConfigDict(extra="forbid")
-
-    benchmark: Text
-    method: Text
-    authors: Text | None = None
-    url: Annotated[str, StringConstraints(pattern="^https?://")] | None = None
-    description: Text | None = None
-    trained_on: Text | None = None
-
-    @property
-    def is_run(self) -> bool:
-        """Whether the method was run here, and its maps not made elsewhere."""
-        return False
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """Full names of what may be scored: of the one method that was run, or of depth and masks in maps."""
-        return (self.method,) if self.is_run else (depth_name(self.method), self.method)
-
-    @model_validator(mode="after")
-    def _has_good_names(self) -> Self:
-        for name in self.methods:
-            check_name(name, "method", may_be_known=self.is_run)
-        return self
-
-
-class ScoredSubmission(Submission):
-    """What the submission.json of a folder of scores says; a method that was run has its full name there."""
-
-    made: Made
-    command_name: Text | None = None
-    half: Half
-
-    @property
-    def is_run(self) -> bool:
-        """Whether the method was run here, and its maps not made elsewhere."""
-        return self.made == RUN
 
 
 @dataclass(frozen=True)
@@ -228,22 +185,6 @@ def _score(
         evaluation = Evaluation(out, frame_of(by_scene(rows)), origin_of(rows), made_again)
         write_evaluation(out, evaluation.frame, evaluation.origin, (SUBMISSION,))
     return evaluation
-
-
-def by_scene(rows: Sequence[Row]) -> list[Row]:
-    """Rows whose datasets belong to one scene of the frame if their titles are the same, in any light."""
-    return [row | {"recipe": row["title"]} for row in rows]
-
-
-def read_submission(folder: Path, model: type[AnySubmission]) -> AnySubmission:
-    """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
-    file, expected = folder / SUBMISSION, f"expected a JSON object of {', '.join(model.model_fields)}"
-    if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{file}: missing, or a link out of the folder; {expected}")
-    try:
-        return model.model_validate_json(file.read_bytes())
-    except ValidationError as fault:
-        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None
 
 
 def _read_as_maps(*_: Any) -> Any:

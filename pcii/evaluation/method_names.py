@@ -4,19 +4,22 @@ A function that is not registered is named "module:function" or "file.py:functio
 it for depth; in Python the function itself stands for it, or a pair of a name and the function.
 
 After `depth:` no name has a colon, so that a full name says which of the two a method is; and none has
-brackets, since tables name in parentheses what is no method.
+brackets, since tables name in parentheses what is no method. A submission to the benchmark names one.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, StringConstraints, ValidationError, model_validator
 
 from pcii.base import InputError, is_plain, load_function, name_of
 from pcii.depth import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.depth import methods as depth
 from pcii.removal import methods as removal
 from pcii.removal import removal_methods
-from pcii.store import own_software, software_with
+from pcii.store import Half, first_fault, own_software, software_with
 
 DEPTH = "depth"
 """Names the default estimator of depth, which has its full name in rows."""
@@ -25,6 +28,11 @@ _NOT_IN_NAMES = frozenset(":()[]{}")
 Function = Callable[..., Any]
 Method = str | Function | tuple[str, Function]
 """What may be given as a method: a name, a removal, or a name and a function."""
+SUBMISSION = "submission.json"
+Made = Literal["run by pcii benchmark run", "scored from maps by pcii benchmark score"]
+RUN, SCORED = get_args(Made)
+Text = Annotated[str, StringConstraints(min_length=1)]
+AnySubmission = TypeVar("AnySubmission", bound="Submission")
 
 
 @dataclass(frozen=True)
@@ -109,7 +117,7 @@ def named_method(method: Method) -> NamedMethod:
         name, function = method if isinstance(method, tuple) else (name_of(method), method)
         if not isinstance(name, str) or not callable(function):
             raise InputError(f"methods: expected names, functions, or pairs (name, function), got {method!r}")
-        check_name(name, "methods")
+        _check_name(name, "methods")
         return NamedMethod(name, function)
     if method == DEPTH:
         return NamedMethod(depth_name(DEFAULT_METHOD))
@@ -122,11 +130,11 @@ def named_method(method: Method) -> NamedMethod:
         raise InputError(f"method: there is no method named {method!r}; use {known}, or module:function")
     function = load_function(source)
     name = name_of(function) if estimator is None else depth_name(name_of(function))
-    check_name(name, "methods")
+    _check_name(name, "methods")
     return NamedMethod(name, function, method)
 
 
-def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
+def _check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
     """Raise `InputError`, which begins with `label`, for a full name that could be taken for another one.
 
     All of it is seen (`is_plain`), it has no colon but that of `depth:`, and no bracket. It differs from
@@ -143,3 +151,54 @@ def check_name(name: str, label: str, *, may_be_known: bool = False) -> None:
         return
     if name.casefold() in {other.casefold() for other in (DEPTH, *known)}:
         raise InputError(f"{label}: the name {name!r} is taken; choose another one")
+
+
+class Submission(BaseModel):
+    """What submission.json says: the benchmark, the name of the method, and more if its authors like.
+
+    The name is without `depth:`, and new for masks and for depth. The page shows `url` as text, no link.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    benchmark: Text
+    method: Text
+    authors: Text | None = None
+    url: Annotated[str, StringConstraints(pattern="^https?://")] | None = None
+    description: Text | None = None
+    trained_on: Text | None = None
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return isinstance(self, ScoredSubmission) and self.made == RUN
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Full names of what may be scored: of the one method that was run, or of depth and masks in maps."""
+        return (self.method,) if self.is_run else (depth_name(self.method), self.method)
+
+    @model_validator(mode="after")
+    def _has_good_names(self) -> Self:
+        for name in self.methods:
+            _check_name(name, "method", may_be_known=self.is_run)
+        return self
+
+
+class ScoredSubmission(Submission):
+    """What the submission.json of a folder of scores says; a method that was run has its full name there."""
+
+    made: Made
+    command_name: Text | None = None
+    half: Half
+
+
+def read_submission(folder: Path, model: type[AnySubmission]) -> AnySubmission:
+    """What submission.json says in a folder; raises `InputError` if it is missing or wrong."""
+    file, expected = folder / SUBMISSION, f"expected a JSON object of {', '.join(model.model_fields)}"
+    if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f"{file}: missing, or a link out of the folder; {expected}")
+    try:
+        return model.model_validate_json(file.read_bytes())
+    except ValidationError as fault:
+        raise InputError(f"{file}: {first_fault(fault)}; {expected}") from None

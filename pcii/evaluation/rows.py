@@ -15,16 +15,17 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated, Any, Literal, NotRequired
 
+from pydantic import BeforeValidator, NonNegativeFloat, TypeAdapter, ValidationError
+from typing_extensions import TypedDict
+
 from pcii.base import InputError, locked, named_in_errors
-from pcii.store import EVALUATION_FOLDER, ROWS
+from pcii.store import EVALUATION_FOLDER, OPEN, ROWS, Text, first_fault
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-    from pydantic import TypeAdapter
 
 Row = dict[str, Any]
 Key = tuple[str, float | str | None, str, tuple[float, ...]]
@@ -56,44 +57,39 @@ def _plane_parts(plane: Mapping[str, Any]) -> Row:
     return parts | {"scores": scores}
 
 
-@cache
-def _row_model() -> "TypeAdapter[Any]":
-    """The model of a row, made when the first is read: pydantic is slow to load."""
-    from pydantic import BeforeValidator, Field, TypeAdapter
-    from typing_extensions import TypedDict
+_Scores = Annotated[dict[str, float | None], BeforeValidator(_measures)]
 
-    from pcii.store import OPEN, Text
 
-    is_not_negative, by_names = Field(ge=0), BeforeValidator(_measures)
+class _Plane(TypedDict):
+    __pydantic_config__ = OPEN  # type: ignore[misc]
+    z_mm: float
+    object: Text | None
+    truth: Literal["object", "pixel"]
+    scores: _Scores
 
-    class Plane(TypedDict):
-        __pydantic_config__ = OPEN  # type: ignore[misc]
-        z_mm: float
-        object: Text | None
-        truth: Literal["object", "pixel"]
-        scores: Annotated[dict[str, float | None], by_names]
 
-    class RowModel(TypedDict):
-        __pydantic_config__ = OPEN  # type: ignore[misc]
-        dataset: Text
-        identity: Text
-        recipe: Text
-        title: Text
-        method: Text
-        budget: Annotated[float, is_not_negative] | Literal["full-light"] | None
-        seed: NotRequired[float | None]
-        settings: NotRequired[dict[str, Any]]
-        z_mm: NotRequired[list[float]]
-        photons_per_view: NotRequired[Annotated[float, is_not_negative] | None]
-        seconds: NotRequired[Annotated[float, is_not_negative] | None]
-        software: NotRequired[dict[str, Text] | None]
-        date: NotRequired[Text]
-        machine: NotRequired[Text]
-        bound_px: NotRequired[float | None]
-        depth: NotRequired[Annotated[dict[str, float | None], by_names]]
-        planes: NotRequired[list[Annotated[Plane, BeforeValidator(_plane_parts)]]]
+class _Row(TypedDict):
+    __pydantic_config__ = OPEN  # type: ignore[misc]
+    dataset: Text
+    identity: Text
+    recipe: Text
+    title: Text
+    method: Text
+    budget: NonNegativeFloat | Literal["full-light"] | None
+    seed: NotRequired[float | None]
+    settings: NotRequired[dict[str, Any]]
+    z_mm: NotRequired[list[float]]
+    photons_per_view: NotRequired[NonNegativeFloat | None]
+    seconds: NotRequired[NonNegativeFloat | None]
+    software: NotRequired[dict[str, Text] | None]
+    date: NotRequired[Text]
+    machine: NotRequired[Text]
+    bound_px: NotRequired[float | None]
+    depth: NotRequired[_Scores]
+    planes: NotRequired[list[Annotated[_Plane, BeforeValidator(_plane_parts)]]]
 
-    return TypeAdapter(RowModel)
+
+_ROW = TypeAdapter(_Row)
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
@@ -143,16 +139,12 @@ def read_rows(out: Path) -> list[Row]:
 
 
 def _parsed(out: Path, content: bytes) -> dict[Key, Row]:
-    from pydantic import ValidationError
-
-    from pcii.store import first_fault
-
     *lines, _ = content.split(b"\n")  # the last one is empty, or unfinished
     rows: dict[Key, Row] = {}
     for number, line in enumerate(lines, start=1):
         try:
             row = json.loads(line)
-            _row_model().validate_python(row)
+            _ROW.validate_python(row)
             if not (row.get("depth") or row.get("planes")):
                 raise ValueError("no scores")
             rows[key_of(row)] = row
@@ -205,7 +197,10 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     ]
     frame = pd.DataFrame(records, columns=None if records else [*HEAD])
     texts = ["scene", "method", "dataset", "identity", "recipe", "objects"]
-    frame[texts] = frame[texts].map(_encodable, na_action="ignore")
+    # With escapes for parts of names of files that are no characters, which pandas cannot hold.
+    frame[texts] = frame[texts].map(
+        lambda text: text.encode(errors="backslashreplace").decode(), na_action="ignore"
+    )
     numbers = frame.columns.difference([*texts, "light"])
     frame[numbers] = frame[numbers].astype("float64")
     frame["scene"] = pd.Categorical(frame["scene"], list(dict.fromkeys(frame["scene"])))
@@ -215,9 +210,9 @@ def frame_of(rows: Sequence[Row]) -> "DataFrame":
     return frame
 
 
-def _encodable(text: str) -> str:
-    """The text with escapes for parts of names of files that are no characters, which pandas cannot hold."""
-    return text.encode(errors="backslashreplace").decode()
+def by_scene(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose datasets belong to one scene of the frame if their titles are the same, in any light."""
+    return [row | {"recipe": row["title"]} for row in rows]
 
 
 def _measured(row: Row) -> Iterable[Row]:

@@ -1,12 +1,11 @@
-"""The measures of an evaluation, their means with intervals, comparisons of methods, and tables of texts.
+"""The measures of an evaluation, their means with intervals, and comparisons of methods.
 
 All are of `Evaluation.frame` (see `pcii.evaluation.rows`). Datasets that differ in seed and amount of light
 alone are one scene. Yardsticks look at no photon.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from pcii.base import InputError
 from pcii.depth import FOR_COUNTS
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.rows import HEAD
-from pcii.figures import NOT_KNOWN, PLACES, emphasised, text_table
+from pcii.figures import PLACES
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -29,23 +28,21 @@ RANDOM_FLIPS = 10_000
 MIN_SCENES = 2
 """One scene has no spread over scenes."""
 CELL = ("scene", "light", "method")
-NOT_BETTER = "†"
-"""Mark of a mean that is no better than the best of `SIMPLE` for the same scene and light."""
 
 
-@dataclass(frozen=True)
-class Measure:
-    """A measure in tables of removal, of depth or of both.
+class Measure(NamedTuple):
+    """A measure, its column in tables of removal, of depth or of both, and what its mean's interval is like.
 
     Methods are compared by those that have an `axis`, its label, in charts and on the benchmark's page, and
     ranked by those of which more is better.
     """
 
     name: str
-    column: str
-    of: Literal["removal", "depth", "both"]
+    column: str = ""
+    of: Literal["removal", "depth", "both", "no table"] = "no table"
     axis: str = ""
     more_is_better: bool = False
+    kind: Kind = "share"
 
 
 MEASURES = (
@@ -58,26 +55,28 @@ MEASURES = (
     Measure("within_1px", "within 1 px", "depth", "share of depths within 1 px", True),
     Measure("within_3px", "within 3 px", "depth", "share of depths within 3 px", True),
     Measure("coverage", "answered", "depth"),
-    Measure("quadratic_score", "quadratic score", "depth", "quadratic score of confidence", True),
+    Measure("quadratic_score", "quadratic score", "depth", "quadratic score of confidence", True, "signed"),
     Measure("brier", "Brier", "depth"),
-    Measure("median_px", "median, px", "depth", "median error of depth, px of total disparity"),
-    Measure("bound_px", "bound, px", "depth"),
-    Measure("bias_px", "bias, px", "depth"),
+    Measure(
+        "median_px", "median, px", "depth", "median error of depth, px of total disparity", False, "positive"
+    ),
+    Measure("bound_px", "bound, px", "depth", kind="positive"),
+    Measure("bias_px", "bias, px", "depth", kind="signed"),
     Measure("hci_objects.badpix_007", "BadPix(0.07)", "depth"),
     Measure("hci.badpix_007", "BadPix(0.07), all pixels", "depth"),
     Measure("ece", "ECE", "depth"),
-    Measure("seconds", "seconds", "both"),
+    Measure("seconds", "seconds", "both", kind="positive"),
+    Measure("bias_mm", kind="signed"),
+    *map(Measure, ("precision", "recall", "f1", "claimed_share", "bad_1px", "bad_3px")),
+    *map(Measure, ("share", "confidence", "correct")),
 )
-"""In the order of their columns."""
+"""In the order of their columns. The interval of a measure that is not among them is "positive"."""
+KINDS: dict[str, Kind] = {measure.name.rpartition(".")[2]: measure.kind for measure in MEASURES}
 AXES = {measure.name: measure.axis for measure in MEASURES if measure.axis}
 """Labels of the measures that are drawn."""
 MORE_IS_BETTER = [measure.name for measure in MEASURES if measure.more_is_better]
 DECISIVE = {"iou": "IoU", "within_1px": "Share of depths within 1 px"}
 """What methods of removal and of depth are compared by above all, and its title."""
-SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
-SHARES |= {"claimed_share", "false_share", "within_1px", "within_3px", "bad_1px", "bad_3px", "coverage"}
-SHARES |= {"badpix_007", "brier", "ece", "share", "confidence", "correct"}
-SIGNED = {"bias_mm", "bias_px", "quadratic_score"}
 NOTHING = "(nothing)"
 YARDSTICKS = {"everything": "(everything)", "one_depth": "(one depth)"}
 """Prefixes of columns with the scores of a yardstick, which looks at no photon, and its name among methods.
@@ -167,11 +166,6 @@ def sign_flip_p(differences: np.ndarray) -> tuple[np.ndarray, float]:
         rng=0,
     )
     return np.asarray(test.pvalue), 2 / 2**n if is_exact else 2 / (1 + RANDOM_FLIPS)
-
-
-def lines_of(table: "DataFrame") -> list[Any]:
-    """The rows of a table, each with its columns as attributes."""
-    return list(table.itertuples())
 
 
 def means(frame: "DataFrame", by: Sequence[str] = CELL) -> "DataFrame":
@@ -280,8 +274,7 @@ def ranks(frame: "DataFrame", measure: str, over: Over | None = None) -> "DataFr
 
 def kind_of(measure: str) -> Kind:
     """What interval the mean of a measure has."""
-    name = measure.removeprefix("pixel_").rpartition(".")[2]
-    return "share" if name in SHARES else "signed" if name in SIGNED else "positive"
+    return KINDS.get(measure.removeprefix("pixel_").rpartition(".")[2], "positive")
 
 
 def with_yardsticks(frame: "DataFrame") -> "DataFrame":
@@ -311,72 +304,3 @@ def accuracies(table: "DataFrame", measure: str) -> "DataFrame":
         places = table[table["measure"] == name].set_index(["method", "light"])["mean"]
         cells[name] = places.reindex(cells.index)
     return cells.reset_index()
-
-
-def _with_interval(mean: float, low: float, high: float) -> str:
-    """A mean with its interval, if it has one, as text; a dash for NaN."""
-    if np.isnan(mean):
-        return NOT_KNOWN
-    return f"{mean:.3f}" if np.isnan(low) else f"{mean:.3f} ({low:.3f} to {high:.3f})"
-
-
-def light_name(light: float | str) -> str:
-    """A light of the frame as the name of a column or plot: "300", "full light"."""
-    return light.replace("-", " ") if isinstance(light, str) else f"{light:g}"
-
-
-def mean_table(
-    means: "DataFrame",
-    rows: Sequence[str],
-    column: str,
-    name: Callable[[Any], str] = str,
-    full_n: int = 0,
-    bound: str = "",
-) -> "DataFrame":
-    """Means with their intervals: `means` has the columns `rows`, and a column is made for each of `column`.
-
-    Of `MORE_IS_BETTER` the best method of a scene (if rows are of scenes) and light stands out, where another
-    is worse, and `NOT_BETTER` marks methods that are no better than the best of `SIMPLE`; `bound`
-    names what is no method. Means of fewer than `full_n` values have their number.
-    """
-    import pandas as pd
-
-    contest = [key for key in ("scene", "light", "measure") if key in means]
-    methods = means["method"].astype(object)
-    is_simple = methods.isin(SIMPLE)
-    values = means["mean"].where(means["measure"].isin(MORE_IS_BETTER) & (methods != bound))
-
-    def best_of(some: "Series") -> "Series":
-        return some.groupby([means[key] for key in contest], observed=True).transform("max")
-
-    is_best = (values == best_of(values)) & (values > -best_of(-values))
-    is_marked = ~is_simple & (values <= best_of(values.where(is_simple)))
-    texts: list[str] = []
-    for row in lines_of(means[["mean", "low", "high", "n"]].assign(is_best=is_best, is_marked=is_marked)):
-        number = f" of {row.n}" if row.n < full_n else ""
-        text = _with_interval(row.mean, row.low, row.high) + number + f" {NOT_BETTER}" * row.is_marked
-        texts.append(emphasised(text) if row.is_best else text)
-    cells = means.assign(text=pd.Series(texts, means.index, dtype=object))
-    table = cells.pivot(index=list(rows), columns=column, values="text").sort_index(axis="columns")
-    table = table.fillna(NOT_KNOWN).set_axis([*map(name, table.columns)], axis="columns").reset_index()
-    if "light" in table:
-        table["light"] = [*map(light_name, table["light"])]
-    return table.set_index([*rows])
-
-
-def rank_table(table: "DataFrame", unit: str) -> "DataFrame":
-    """Methods ranked over scenes or datasets; `table` is of `ranks`."""
-    rows = [
-        (
-            row.method,
-            light_name(row.light),
-            str(row.rank),
-            _with_interval(row.mean, row.low, row.high),
-            _with_interval(row.difference, row.difference_low, row.difference_high),
-            *(NOT_KNOWN if np.isnan(p) else f"{p:.2g}" for p in (row.p, row.least_p)),
-            str(row.n),
-        )
-        for row in lines_of(table)
-    ]
-    header = ("method", "photons", "rank", "mean", "minus that of the best", "p", "least p possible", unit)
-    return text_table(rows, header)

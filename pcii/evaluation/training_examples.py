@@ -99,7 +99,12 @@ class Examples(Sequence[Example]):
         entropy = None if self.seed is None else (self.seed, self.epoch, number % len(self))
         rng = np.random.default_rng(entropy)
         pose = _Pose.random(dataset.grid, self.crop_px, self.poses, rng)
-        planes = self._planes_of(dataset, pose.of_grid(dataset.grid))
+        grid = pose.of_grid(dataset.grid)
+        if isinstance(self.planes, int):
+            near_px, far_px = total_disparity_px(grid, np.array(depth_range_of(dataset)))
+            planes = FocalPlanes.at_total_disparity(grid, np.linspace(near_px, far_px, self.planes))
+        else:
+            planes = FocalPlanes.at_depths(grid, self.planes)
         example: Example = {}
         if {*self.fields} - {"truth"}:
             counts = pose.of_counts(dataset.counts)
@@ -117,12 +122,6 @@ class Examples(Sequence[Example]):
                 raise InputError(f"{dataset.path}: has no truth, which the field 'truth' is made of")
             example |= _truth_fields(pose.of_truth(dataset.truth), planes)
         return example
-
-    def _planes_of(self, dataset: Dataset, grid: CameraGrid) -> FocalPlanes:
-        if not isinstance(self.planes, int):
-            return FocalPlanes.at_depths(grid, self.planes)
-        near_px, far_px = total_disparity_px(grid, np.array(depth_range_of(dataset)))
-        return FocalPlanes.at_total_disparity(grid, np.linspace(near_px, far_px, self.planes))
 
 
 @dataclass(frozen=True)
@@ -242,7 +241,10 @@ def _of_split(
         ends = np.cumsum(shares)
         of_scene = by == "scene"
         keys = [(r.get("scene"), r.get("scene_number")) if of_scene else r.get("seed") for r in rows]
-        splits = [SPLITS[min(int(np.searchsorted(ends, _hashed(key), "right")), 2)] for key in keys]
+        # Numbers from 0 to 1 that are the same for a key on every machine.
+        digests = [hashlib.sha256(repr(key).encode()).digest() for key in keys]
+        places = [int.from_bytes(digest[:8], "big") / 2**64 for digest in digests]
+        splits = [SPLITS[min(int(place), 2)] for place in np.searchsorted(ends, places, "right")]
     elif None in splits:
         raise InputError("shares: missing; scenes that are not drawn have no split of their own")
     mask = [each == split for each in splits]
@@ -250,8 +252,3 @@ def _of_split(
         other = "scene" if by == "seed" else "seed"
         raise InputError(f"split: no dataset is in the split {split}; choose other shares, or by={other!r}")
     return data[mask] if is_collection else [*compress(data, mask)]
-
-
-def _hashed(key: object) -> float:
-    """A number from 0 to 1 that is the same for a key on every machine."""
-    return int.from_bytes(hashlib.sha256(repr(key).encode()).digest()[:8], "big") / 2**64

@@ -1,8 +1,5 @@
 """Every drawing: 8-bit pictures of arrays, what Matplotlib draws for `.plot()` and notebooks, and pages.
 
-Functions take plain arrays; one module knows by the name of a type what of it is worth a picture. So this
-room comes before `types`.
-
 Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or else into a new figure of
 `pyplot`, and returns them as an array (N,), one for each panel. It takes them as a list, one panel's alone
 too. Where no depth is answered a picture is grey, a colour that no map of values has. Matplotlib is imported

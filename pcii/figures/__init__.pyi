@@ -5,7 +5,7 @@ from .charts import in_style as in_style, new_figure as new_figure, PLACES as PL
 from .pages import emphasised as emphasised, NOT_KNOWN as NOT_KNOWN, render_page as render_page
 from .pages import text_table as text_table
 from .pictures import agreement_image as agreement_image, block_px as block_px, DEPTH_COLOURS as DEPTH_COLOURS
-from .pictures import depth_image as depth_image, drawing_uri as drawing_uri, ERROR_COLOURS as ERROR_COLOURS
+from .pictures import drawing_uri as drawing_uri, ERROR_COLOURS as ERROR_COLOURS
 from .pictures import exposed as exposed, filled_means as filled_means, map_image as map_image
 from .pictures import mask_image as mask_image, photo_uri as photo_uri, photon_picture as photon_picture
 from .pictures import SHARE_COLOURS as SHARE_COLOURS, smoothed as smoothed, smoothing_for as smoothing_for

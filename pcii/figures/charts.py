@@ -1,8 +1,4 @@
-"""Figures and axes to draw in, figures as files, and charts of scores.
-
-Charts are of accuracy against photons and seconds, and of how far confidence is right; they are drawn of data
-frames, a row for each mean or bin.
-"""
+"""Figures and axes to draw in, figures as files, and charts of scores, drawn of data frames."""
 
 import io
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,4 @@
-"""Arrays as 8-bit sRGB pictures, and their files.
-
-Photons and light are shown in blocks, smoothed where photons are few, and several images at one exposure;
-masks, depth and errors have fixed colours.
-"""
+"""Arrays as 8-bit sRGB pictures, and their files."""
 
 import base64
 import io
@@ -185,13 +181,6 @@ def map_image(
     image = np.round(255 * image).astype(np.uint8)
     image[~is_known] = NO_ANSWER
     return image
-
-
-def depth_image(
-    z_mm: np.ndarray, near_mm: float, far_mm: float, confidence: np.ndarray | None = None
-) -> np.ndarray:
-    """Depth (H, W) from near (yellow) to far (violet), paler where less sure, grey where not finite."""
-    return map_image(z_mm, DEPTH_COLOURS, (near_mm, far_mm), confidence)
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

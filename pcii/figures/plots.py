@@ -27,8 +27,8 @@ from pcii.figures.pictures import (
     NO_ANSWER,
     PANEL_PX,
     block_px,
-    depth_image,
     exposed,
+    map_image,
     photon_picture,
     uri_of,
 )
@@ -167,7 +167,7 @@ def _draw_depths(
         _show_picture(axes, np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape))
         _write_in_middle(axes, "no depth is known")
         return
-    _show_picture(axes, depth_image(z_mm, *limits, confidence), z_mm.shape, title)
+    _show_picture(axes, map_image(z_mm, DEPTH_COLOURS, limits, confidence), z_mm.shape, title)
     figure: Any = axes.get_figure(root=True)
     bar = figure.colorbar(colour_scale(DEPTH_COLOURS, limits), ax=axes, label="depth z (mm)")
     bar.ax.invert_yaxis()  # near is on top

@@ -160,8 +160,7 @@ def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, An
         confidence, right = _mean(stated, inside), _mean(correct, inside)
         if confidence is not None and right is not None:
             ece += share * abs(right - confidence)
-        ends = (number / CONFIDENCE_BINS, (number + 1) / CONFIDENCE_BINS)
-        name = f"{ends[0]:.1f}-{ends[1]:.1f}"
+        name = f"{number / CONFIDENCE_BINS:.1f}-{(number + 1) / CONFIDENCE_BINS:.1f}"
         reliability[name] = {"share": share, "confidence": confidence, "correct": right}
     return {"ece": ece, "reliability": reliability}
 

@@ -82,7 +82,9 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, true: TrueFocus | None) ->
         before, after = (_mean_entropy_bits(each, maxima[plane]) for each in (pooled[plane], removed))
         photons = _photon_agreement(focus, true, plane)
         for kind in KINDS:
-            names = [] if true is None or kind == "pixel" else true.names_at(plane)
+            names: list[str] = []
+            if true is not None and kind == "object":
+                names = [true.truth.names[number] for number, at in true.plane_of.items() if at == plane]
             mask = share = is_free = None
             if true is not None and (kind == "pixel" or true.truth.are_objects_known):
                 mask, coverage, ids = true.masks(kind)[plane], true.truth.coverage, true.truth.object_id

@@ -46,10 +46,6 @@ class TrueFocus:
                     plane_of[number] = nearest
         return plane_of
 
-    def names_at(self, plane: int) -> list[str]:
-        """Names of the objects that belong to a plane."""
-        return [self.truth.names[number] for number, nearest in self.plane_of.items() if nearest == plane]
-
     @cached_property
     def by_object(self) -> np.ndarray:
         """Truth by object: (Z, H, W) bool, the pixels of the objects that belong to each plane."""

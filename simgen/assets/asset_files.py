@@ -84,20 +84,15 @@ def read_texture(path: Path, *, for_gltf: bool = False) -> np.ndarray:
         pixels = picture.pixels[0]
     else:
         (pixels,) = decode(replace(picture, orientation=UPRIGHT))
-        pixels = _turn_upright(pixels, picture.orientation)
+        # From 5 on its rows are columns; then either may run backwards.
+        turned = pixels.swapaxes(0, 1) if 5 <= picture.orientation <= 8 else pixels
+        up, left = picture.orientation in (3, 4, 7, 8), picture.orientation in (2, 3, 6, 7)
+        pixels = turned[:: -1 if up else 1, :: -1 if left else 1]
     if picture.dtype == np.bool_ or picture.bits is not None:
         pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
     if picture.shape[2] == 1:
         pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=2), pixels[..., 1:]], axis=2)
     return pixels
-
-
-def _turn_upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Pixels of a file upright: from 5 on its rows are columns; then either may run backwards."""
-    if 5 <= orientation <= 8:
-        pixels = pixels.swapaxes(0, 1)
-    up, left = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
-    return pixels[:: -1 if up else 1, :: -1 if left else 1]
 
 
 def read_environment(path: Path) -> np.ndarray:
@@ -196,20 +191,18 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
     left out; others, such as curved surfaces, are refused.
     """
     libraries: list[str] = []
-    groups: dict[tuple[str, str], int] = {}
-    group, material, owners = "", "", list[int]()
+    group, material = "", ""
     points: dict[str, list[list[float]]] = {"v": [], "vt": [], "vn": []}
-    corners: list[list[int]] = []
-    counts: list[int] = []
+    faces: dict[tuple[str, str], tuple[list[list[int]], list[int]]] = {}
     text = data.decode("latin-1").replace("\\\r\n", " ").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), start=1):
         keyword, *words = line.split("#", 1)[0].split() or [""]
         try:
-            if keyword == "f":
+            if keyword == "f" and words:
                 sizes = [len(values) for values in points.values()]
+                corners, counts = faces.setdefault(("", "") if as_one else (group, material), ([], []))
                 corners += [_corner(word, sizes) for word in words]
                 counts.append(len(words))
-                owners.append(groups.setdefault(("", "") if as_one else (group, material), len(groups)))
             elif keyword in ("o", "g"):
                 group = " ".join(words)
             elif keyword == "usemtl":
@@ -226,15 +219,13 @@ def obj_parts(data: bytes, *, as_one: bool = False) -> tuple[list[str], dict[tup
                 raise ValueError
         except ValueError:
             raise ValueError(f"has a line {number} that cannot be used: {line.strip()[:60]!r}") from None
-    if not corners:
+    if not faces:
         raise ValueError("has no faces")
-    owner, number_of, all_corners = np.array(owners), np.array(counts), np.array(corners).reshape(-1, 3)
     values = [np.array(one) for one in points.values()]
-    parts = {}
-    for name, group in groups.items():
-        triples = all_corners[np.repeat(owner == group, number_of)]
-        parts[name] = _obj_mesh(values, triples, number_of[owner == group])
-    return libraries, parts
+    return libraries, {
+        name: _obj_mesh(values, np.array(corners), np.array(counts))
+        for name, (corners, counts) in faces.items()
+    }
 
 
 def _obj_mesh(values: list[np.ndarray], triples: np.ndarray, counts: np.ndarray) -> Triangles:

@@ -75,10 +75,16 @@ class Triangles:
         corners = _numbers("position", positions[used])
         if not np.ptp(corners, axis=0).any():
             raise ValueError("has no extent: all its vertices are one point")
+        if normals is not None:
+            normals = _numbers("normal", normals[used])
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            if not lengths.all():
+                raise ValueError("has a normal of length 0")
+            normals = (normals / lengths).astype(np.float32)
         return cls(
             corners.astype(np.float32),
             faces.astype(np.int32),
-            None if normals is None else _unit(_numbers("normal", normals[used])),
+            normals,
             None if uv is None else _numbers("texture coordinate", uv[used]).astype(np.float32),
         )
 
@@ -88,13 +94,6 @@ def _numbers(what: str, array: np.ndarray) -> np.ndarray:
     if beyond.size:
         raise ValueError(f"has a {what} of {beyond[0]:g}; numbers up to {LARGEST_COORDINATE:g} are allowed")
     return array.astype(np.float64)
-
-
-def _unit(normals: np.ndarray) -> np.ndarray:
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    if not lengths.all():
-        raise ValueError("has a normal of length 0")
-    return (normals / lengths).astype(np.float32)
 
 
 def fan_all(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:

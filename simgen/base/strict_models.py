@@ -129,10 +129,9 @@ def toml_text(model: Strict, comments: Sequence[str] = ()) -> str:
     values: list[str] = []
     tables: list[list[str]] = []
     for name, value in _written_fields(model):
-        if isinstance(value, BaseModel):
-            tables.append([f"[{name}]", *_lines(value)])
-        elif isinstance(value, tuple) and all(isinstance(part, BaseModel) for part in value):
-            tables += [[f"[[{name}]]", *_lines(part)] for part in value]
+        parts, title = (value, f"[[{name}]]") if isinstance(value, tuple) else ((value,), f"[{name}]")
+        if all(isinstance(part, BaseModel) for part in parts):
+            tables += [[title, *(_line(*field) for field in _written_fields(part))] for part in parts]
         else:
             values.append(_line(name, value))
     return "\n".join("".join(f"{line}\n" for line in block) for block in (head, values, *tables) if block)
@@ -148,14 +147,11 @@ def _written_fields(model: BaseModel) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _lines(model: BaseModel) -> list[str]:
-    return [_line(name, value) for name, value in _written_fields(model)]
-
-
 def _line(name: str, value: Any) -> str:
     """A field on one line, or on several if it is a string that has several."""
     if isinstance(value, str) and "\n" in value:
-        return f'{name} = """\n{_escaped(value)}"""'
+        text = "\n".join(_inline(line)[1:-1] for line in value.split("\n"))
+        return f'{name} = """\n{text}"""'
     return f"{name} = {_inline(value)}"
 
 
@@ -164,15 +160,9 @@ def _inline(value: Any) -> str:
         return f"{{ {', '.join(f'{name} = {_inline(part)}' for name, part in _written_fields(value))} }}"
     if isinstance(value, tuple):
         return f"[{', '.join(_inline(part) for part in value)}]"
-    if isinstance(value, str):
-        return f'"{_escaped(value)}"'
+    if isinstance(value, str):  # TOML has JSON's escapes, and one for DEL
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return str(value).lower() if isinstance(value, bool) else repr(value)
-
-
-def _escaped(text: str) -> str:
-    """The text between quotation marks, line by line: TOML has JSON's escapes, and one for DEL."""
-    lines = (json.dumps(line, ensure_ascii=False)[1:-1] for line in text.split("\n"))
-    return "\n".join(lines).replace("\x7f", "\\u007f")
 
 
 def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:

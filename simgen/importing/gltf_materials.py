@@ -90,7 +90,11 @@ class Surface:
         document = self.gltf.document
         texture = self.gltf.item(document.textures, info.index, "textures")
         texcoord = info.tex_coord if info.other_tex_coord is None else info.other_tex_coord
-        uv_matrix, reason = _uv_matrix(info), ""
+        # KHR_texture_transform: scaled, turned counterclockwise as one looks at the picture, moved.
+        (x, y), (width, height) = info.uv_offset, info.uv_scale
+        c, s = np.cos(info.uv_rotation), np.sin(info.uv_rotation)
+        uv_matrix = np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
+        reason = ""
         if not self.with_pictures:
             reason = "pictures on meshes without texture coordinates for them"
         elif texture.source is None:
@@ -141,6 +145,11 @@ class Surface:
         clear, coat = self._pixels(material.transmission_texture), self._pixels(material.clearcoat_texture)
         # The gloss with the same GGX alpha: ours goes from 0.1 to 0.001 linearly, theirs is roughness^2.
         gloss = float(np.clip((0.1 - material.clearcoat_roughness**2) / 0.099, 0, 1))
+        # The index whose highlights are as strong as index and specular factor of the file make them. By
+        # KHR_materials_ior 0 is the largest of all.
+        index = max(material.ior, 1.0) if material.ior else MOST_INDEX
+        amplitude = (index - 1) / (index + 1) * np.sqrt(material.specular_factor)
+        index = float(np.clip((1 + amplitude) / (1 - amplitude), LEAST_INDEX, MOST_INDEX))
         return {
             "type": "principled",
             "metallic": self._share("metallic", material.metallic_factor, packed, 2),
@@ -148,7 +157,7 @@ class Surface:
             "transmission": self._share("transmission", material.transmission_factor, clear, 0),
             "clearcoat": self._share("clearcoat", material.clearcoat_factor, coat, 0),
             "clearcoat_gloss": round(gloss, 6),
-            "refractive_index": self._refractive_index(),
+            "refractive_index": round(index, 6),
         }
 
     def _share(self, what: str, factor: float, pixels: np.ndarray | None, channel: int) -> float | str:
@@ -157,13 +166,6 @@ class Surface:
         if np.ptp(shares) == 0:
             return round(float(shares.flat[0]), 6)
         return self._keep(what, _stored(shares))
-
-    def _refractive_index(self) -> float:
-        """The index whose highlights are as strong as index and specular factor of the file make them."""
-        # By KHR_materials_ior 0 is the largest of all.
-        index = max(self.material.ior, 1.0) if self.material.ior else MOST_INDEX
-        amplitude = (index - 1) / (index + 1) * np.sqrt(self.material.specular_factor)
-        return round(float(np.clip((1 + amplitude) / (1 - amplitude), LEAST_INDEX, MOST_INDEX)), 6)
 
     def _add_normals(self) -> None:
         info = self.material.normal_texture
@@ -192,13 +194,6 @@ class Surface:
             # White of the new picture has the luminance of the strongest factor.
             file = self._keep("emission", _tinted(pixels[..., :3], rgb_cd_m2 / rgb_cd_m2.max()))
             self.values["emission"] = {"luminance_cd_m2": float(rgb_cd_m2.max()), "texture": file}
-
-
-def _uv_matrix(info: TextureInfo) -> np.ndarray:
-    """KHR_texture_transform: scaled, turned counterclockwise as one looks at the picture, moved."""
-    (x, y), (width, height) = info.uv_offset, info.uv_scale
-    c, s = np.cos(info.uv_rotation), np.sin(info.uv_rotation)
-    return np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
 
 
 def _tinted(pixels: np.ndarray, factor: np.ndarray) -> np.ndarray:

@@ -83,13 +83,9 @@ def import_scene(
 
     A glTF file is translated into an ordinary scene, and so is a mesh, each group of an OBJ file and each
     solid of an STL file as an object. A Mitsuba scene is copied, with all files that it names, beside a
-    scene.toml that refers to it. A camera of the file, `camera` if there are several, becomes the virtual
-    centre; or the middle of the scene comes to `place_at_mm`. `unit` is the file's, metres unless it is a
-    mesh, and `up` the axis of a mesh that is up; `fit_mm` makes the longest side so long.
-    `emission_unit` is that of the emission of a glTF file's materials: nit, which are cd/m^2, or watt, which
-    are W/(sr m^2) and become 683 cd/m^2 each, as lights do that Blender exports in its mode Standard.
-    `unscored` are names of objects that count in no score, such as a floor. Raises `pcii.InputError` for a
-    file that cannot be read or has no such object, and for a folder that is there already.
+    scene.toml that refers to it. The other arguments are the options of `simgen import-scene`. Raises
+    `pcii.InputError` for a file that cannot be read or has no such object, and for a folder that is there
+    already.
     """
     check_installed()
     path, folder = Path(file), Path(out)

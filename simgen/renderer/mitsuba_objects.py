@@ -314,7 +314,7 @@ def _reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
     if isinstance(reflectance, str):
         spectrum = spectra.patch(reflectance)
     else:
-        spectrum = spectra.resampled(reflectance.wavelength_nm, reflectance.value)
+        spectrum = np.interp(spectra.WAVELENGTH_NM, reflectance.wavelength_nm, reflectance.value)
     if is_spectral(mi):
         return spectrum_plugin(spectrum)
     return {"type": "rgb", "value": spectra.linear_srgb(spectrum).tolist()}

@@ -1,6 +1,6 @@
 """Lamps and what shines from all around: where they stand, how bright and of what colour they are."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
@@ -24,14 +24,11 @@ def _not_black(colour: tuple[float, float, float]) -> tuple[float, float, float]
     return colour
 
 
-def string_or_value(written: Any) -> str:
-    """Which part of a union is meant, so that an error is about that one alone."""
-    return "string" if isinstance(written, str) else "value"
-
-
+STRING_OR_VALUE = Discriminator(lambda written: "string" if isinstance(written, str) else "value")
+"""Which part of a union is meant, so that an error is about that one alone."""
 Illuminant = Annotated[
     Annotated[NamedIlluminant, Tag("string")] | Annotated[Colour, AfterValidator(_not_black), Tag("value")],
-    Discriminator(string_or_value),
+    STRING_OR_VALUE,
 ]
 """Colour of the light: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""
 

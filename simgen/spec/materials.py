@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from pcii.base import srgb_to_linear
 from simgen.base import Colour, ImageName, NonNegative, Positive, Real, Share, Strict, Whole
-from simgen.spec.lights import Illuminant, string_or_value
+from simgen.spec.lights import STRING_OR_VALUE, Illuminant
 from simgen.spectral import WAVELENGTH_NM, known_patch, patch_names
 
 LEAST_INDEX, MOST_INDEX = 1.01, 3.0
@@ -22,7 +22,7 @@ CLIPPED_SHARE = 0.01
 Roughness = Annotated[Real, Field(ge=0.001, le=1)]
 Index = Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)]
 ShareOrImage = Annotated[
-    Annotated[Share, Tag("value")] | Annotated[str, ImageName, Tag("string")], Discriminator(string_or_value)
+    Annotated[Share, Tag("value")] | Annotated[str, ImageName, Tag("string")], STRING_OR_VALUE
 ]
 """A number from 0 to 1, or a grey image of such."""
 Cells = Annotated[Whole, Field(ge=1, le=1024)]
@@ -247,8 +247,7 @@ Reflectance = Annotated[
 ]
 """As sRGB, as the name of a ColorChecker patch, or as a spectrum."""
 FileOrPattern = Annotated[
-    Annotated[str, ImageName, Tag("string")] | Annotated[Texture, Tag("value")],
-    Discriminator(string_or_value),
+    Annotated[str, ImageName, Tag("string")] | Annotated[Texture, Tag("value")], STRING_OR_VALUE
 ]
 
 
@@ -276,7 +275,7 @@ class Material(Strict):
 
     @model_validator(mode="after")
     def _fits_its_finish(self) -> Self:
-        colours = [field for field in ("reflectance", "texture") if getattr(self, field) is not None]
+        colours = [name for name in ("reflectance", "texture") if getattr(self, name) is not None]
         if isinstance(self.finish, Metal | Glass):
             if colours:
                 raise ValueError(f"{colours[0]}: the colour of {self.finish.type} is its own; leave it out")

@@ -130,9 +130,10 @@ class MitsubaXml:
                 return
             if not file:
                 refuse("a file name is empty")
-            # Where Mitsuba looks for it.
+            # Where Mitsuba looks for it: the first folder that has one.
             searched = {"string": folders[-1:], "include": (own_folder, *folders)}.get(tag, folders)
-            file = self._first(file, searched)
+            paths = [str(folder / file) for folder in searched]
+            file = next((each for each in paths if os.access(self._folder / each, os.F_OK)), paths[-1])
             asset(self._folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
@@ -147,11 +148,6 @@ class MitsubaXml:
             why = expat.ErrorString(fault.code)
             raise InputError(f"{path}: line {fault.lineno}: not valid XML: {why}") from None
         return names
-
-    def _first(self, file: str, folders: tuple[PurePosixPath, ...]) -> str:
-        """The file of that name in the first of the folders that has one."""
-        paths = [str(folder / file) for folder in folders]
-        return next((path for path in paths if os.access(self._folder / path, os.F_OK)), paths[-1])
 
     def _completed(self, value: str) -> str:
         """An attribute with the values of `<default>` in the place of their `$names`, as Mitsuba has it."""

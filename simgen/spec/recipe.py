@@ -32,7 +32,6 @@ ViewPasses = Annotated[
         json_schema_input_type=bool | tuple[ViewPass, ...],
     ),
 ]
-CameraName = Annotated[str, Field(json_schema_extra=lambda schema: schema.update(examples=[*camera_names()]))]
 Efficiency = Annotated[Real, Field(gt=0, le=1)]
 Spread = Annotated[Real, Field(ge=0, le=LARGEST_MM)]
 Shear = Annotated[Real, Field(ge=-MAX_SHEAR_PX, le=MAX_SHEAR_PX)]
@@ -237,15 +236,11 @@ class Products(Strict):
     """Full-light images as float32 EXR: behind the Bayer pattern, or all three colours."""
 
     @model_validator(mode="after")
-    def _parts_have_their_whole(self) -> Self:
+    def _fit_each_other(self) -> Self:
         if self.visibility and not self.truth:
             raise ValueError("visibility: it is counted for the points of the truth; set truth = true too")
         if self.frames and not self.counts:
             raise ValueError("frames: they are those of the counts; set counts = true too")
-        return self
-
-    @model_validator(mode="after")
-    def _training_is_of_little(self) -> Self:
         others = {"radiance": self.radiance != "none", "visibility": self.visibility}
         others["view_truth"] = bool(self.view_truth)
         if self.profile == "training" and any(others.values()):

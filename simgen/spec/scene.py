@@ -297,16 +297,12 @@ class Scene(Strict):
         source = checked_folder(self)
         files = {out / name: asset(source, name, where).read_bytes() for where, name in scene_files(self)}
         files[out / "scene.toml"] = text
-        changes = {
-            path: content
-            for path, content in files.items()
-            if not path.is_file() or path.read_bytes() != content
-        }
+        changes = [path for path in files if not path.is_file() or path.read_bytes() != files[path]]
         for path in changes:
             if path.is_dir() or (path.exists() and not overwrite):
                 raise InputError(f"{path}: is there with other content; give overwrite=True")
-        for path, content in changes.items():
-            write_bytes_safely(path, content)
+        for path in changes:
+            write_bytes_safely(path, files[path])
         return out / "scene.toml"
 
 

@@ -6,16 +6,12 @@ wavelengths, Wilkie et al. 2014), drawn with a density that follows s_c times th
 no path is wasted on light that the pixel's filter stops.
 """
 
-import csv
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
-from pcii.base import InputError
-from simgen.base import suggestion
-from simgen.spectral.spectra import WAVELENGTH_NM, colour_science, integral, measured, observer, resampled
+from simgen.spectral.spectra import WAVELENGTH_NM, integral, observer
 
 PEAK_NM = 555.0
 """Where a lumen is 1/683 W."""
@@ -24,8 +20,6 @@ HEROES = 4
 CELLS = 512
 EVEN_SHARE = 0.01
 """Share of the wavelengths that are drawn evenly, for light that no lamp is known to have."""
-MAX_CSV_BYTES = 1 << 20
-CSV_HEAD = ["wavelength_nm", "R", "G", "B"]
 
 
 @dataclass(frozen=True)
@@ -88,47 +82,3 @@ def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:
     to_photons = curves / WAVELENGTH_NM
     detected = to_photons / to_photons.max()
     return Filters(detected * (WAVELENGTH_NM / PEAK_NM) / integral(observer()[1]), light)
-
-
-def camera_names() -> list[str]:
-    """Names of the cameras that colour-science has."""
-    return list(colour_science().MSDS_CAMERA_SENSITIVITIES)
-
-
-def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
-    """Relative sensitivities (3, N) of R, G and B to light's power, or (1, N); the highest value is 1.
-
-    `camera` is one that colour-science ships, or a CSV file (in `recipe_folder`): the head
-    wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
-    """
-    if camera.lower().endswith(".csv"):
-        wavelength_nm, curves = _read_csv(recipe_folder / camera)
-        rows = np.array([resampled(wavelength_nm, row, outside=0.0) for row in curves.T])
-    else:
-        table = colour_science().MSDS_CAMERA_SENSITIVITIES
-        if camera not in table:
-            raise InputError(f"sensor.camera: there is no camera {camera!r}{suggestion(camera, list(table))}")
-        rows = measured(table[camera], outside=0.0)
-    if (rows.max(axis=1) <= 0).any():
-        raise InputError(f"sensor.camera: a colour of {camera!r} sees no light from 380 to 780 nm")
-    return rows / rows.max()
-
-
-def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths (M,) in nm and sensitivities (M, 3) or (M, 1)."""
-    if not path.is_file() or path.stat().st_size > MAX_CSV_BYTES:
-        raise InputError(f"sensor.camera: there is no file {path} of at most {MAX_CSV_BYTES} bytes")
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
-        table = np.array(rows, dtype=np.float64)
-    except (OSError, ValueError, csv.Error):
-        head, table = [], np.zeros((0, 0))
-    is_head = head == CSV_HEAD or (len(head) == 2 and head[0] == CSV_HEAD[0])
-    is_table = is_head and table.ndim == 2 and table.shape[1] == len(head) and np.isfinite(table).all()
-    if not is_table or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
-        raise InputError(
-            f"{path}: expected the head {','.join(CSV_HEAD)}, or {CSV_HEAD[0]} and a name of one curve, and "
-            "rows of as many numbers: growing wavelengths, and sensitivities that are finite and not negative"
-        )
-    return table[:, 0], table[:, 1:]

@@ -1,10 +1,12 @@
-"""Spectra of lights and surfaces, on one set of wavelengths; measured ones from colour-science.
+"""Spectra of lights and surfaces and sensitivities of cameras, on one set of wavelengths; measured ones from
+colour-science.
 
 Notation: N wavelengths, `WAVELENGTH_NM` (N,). A light's spectrum is its radiance in cd/m^2 of white
 light of equal energy at each wavelength (cd/m^2, the numbers that the renderer's white has), so that
 its integral with the CIE luminosity function, divided by that function's integral, is its luminance.
 """
 
+import csv
 import warnings
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -14,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import LUMINANCE, InputError, linear_to_srgb
-from simgen.base import cached, not_installed, suggestion
+from simgen.base import asset, cached, not_installed, suggestion
 
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """From CIE XYZ to linear sRGB."""
@@ -23,6 +25,7 @@ DAYLIGHT = "D65"
 """The white of sRGB."""
 CHART = "ColorChecker N Ohta"
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
+CSV_HEAD = ["wavelength_nm", "R", "G", "B"]
 KINDS = OBSERVERS, ILLUMINANTS, PATCHES = "observers", "illuminants", "patches"
 
 
@@ -36,12 +39,7 @@ def integral(values: np.ndarray) -> Any:
     return np.trapezoid(values, WAVELENGTH_NM, axis=-1)
 
 
-def resampled(wavelength_nm: Any, values: Any, *, outside: float | None = None) -> np.ndarray:
-    """A table's values at `WAVELENGTH_NM`, linear in between; beyond its ends `outside`, or its last one."""
-    return np.interp(WAVELENGTH_NM, wavelength_nm, values, left=outside, right=outside)
-
-
-def measured(table: Any, *, outside: float | None = None) -> np.ndarray:
+def _measured(table: Any, *, outside: float | None = None) -> np.ndarray:
     """One of colour-science's tables at `WAVELENGTH_NM`, (N,) or (C, N), interpolated as the CIE recommends.
 
     That is Sprague's way where steps are even (CIE 167:2005), which linear ones miss by up to 0.4 %. What
@@ -82,7 +80,7 @@ def _from_colour_science() -> dict[str, dict[str, Any]]:
         PATCHES: {name.split(" (")[0]: one for name, one in colour.SDS_COLOURCHECKERS[CHART].items()},
     }
     return {
-        kind: {name: measured(table).tolist() for name, table in of_kind.items()}
+        kind: {name: _measured(table).tolist() for name, table in of_kind.items()}
         for kind, of_kind in tables.items()
     }
 
@@ -148,6 +146,48 @@ def linear_srgb(reflectance: np.ndarray) -> np.ndarray:
     # White, which the four digits of its definition miss by up to 5e-4, is 1 exactly.
     ours, whites = (FROM_XYZ @ integral(observer() * white * one) for one in (reflectance, 1.0))
     return np.clip(ours / whites, 0, 1)
+
+
+def camera_names() -> list[str]:
+    """Names of the cameras that colour-science has."""
+    return list(colour_science().MSDS_CAMERA_SENSITIVITIES)
+
+
+def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
+    """Relative sensitivities (3, N) of R, G and B to light's power, or (1, N); the highest value is 1.
+
+    `camera` is one that colour-science ships, or a CSV file (in `recipe_folder`): the head
+    wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
+    """
+    if camera.lower().endswith(".csv"):
+        wavelength_nm, curves = _read_csv(asset(recipe_folder, camera, "sensor.camera"))
+        rows = np.array([np.interp(WAVELENGTH_NM, wavelength_nm, row, left=0, right=0) for row in curves.T])
+    else:
+        table = colour_science().MSDS_CAMERA_SENSITIVITIES
+        if camera not in table:
+            raise InputError(f"sensor.camera: there is no camera {camera!r}{suggestion(camera, list(table))}")
+        rows = _measured(table[camera], outside=0.0)
+    if (rows.max(axis=1) <= 0).any():
+        raise InputError(f"sensor.camera: a colour of {camera!r} sees no light from 380 to 780 nm")
+    return rows / rows.max()
+
+
+def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths (M,) in nm and sensitivities (M, 3) or (M, 1)."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
+        table = np.array(rows, dtype=np.float64)
+    except (ValueError, csv.Error):
+        head, table = [], np.zeros((0, 0))
+    is_head = head == CSV_HEAD or (len(head) == 2 and head[0] == CSV_HEAD[0])
+    is_table = is_head and table.ndim == 2 and table.shape[1] == len(head) and np.isfinite(table).all()
+    if not is_table or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
+        raise InputError(
+            f"{path}: expected the head {','.join(CSV_HEAD)}, or {CSV_HEAD[0]} and a name of one curve, and "
+            "rows of as many numbers: growing wavelengths, and sensitivities that are finite and not negative"
+        )
+    return table[:, 0], table[:, 1:]
 
 
 @cache

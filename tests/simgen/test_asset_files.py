@@ -209,6 +209,7 @@ REFUSED: list[tuple[str, bytes | np.ndarray | None, str]] = [
     ("a.ply", triangle_ply(faces=""), "has no faces"),
     ("a.ply", ply_of("s t", order="<")[:-5], "cannot be read: element 'face'"),
     ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4 that cannot be used: 'f 1 2 4'"),
+    ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\ng a\nf\n", "line 6 that cannot be used: 'f'"),
     ("a.obj", b"", "has no faces"),
     ("a.xml", b"<scene version='3.0.0'/>", "not named .ply or .obj"),
     ("a.png", png(60_000, zlib.compress(bytes(1 << 20))), "exceeds limit"),

@@ -16,7 +16,15 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
 import pcii
-from pcii.figures import accuracy_chart, calibration_chart, depth_image, exposed, smoothed, smoothing_for
+from pcii.figures import (
+    DEPTH_COLOURS,
+    accuracy_chart,
+    calibration_chart,
+    exposed,
+    map_image,
+    smoothed,
+    smoothing_for,
+)
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
 Z_MM = [1.0, 2.0]
@@ -147,8 +155,8 @@ def test_few_photons_of_a_bright_scene_are_smoothed_until_they_are_bright(per_pi
 
 def test_depth_is_brighter_the_nearer_and_paler_the_less_sure() -> None:
     z_mm = np.array([[400.0, 500.0, 600.0]])
-    sure = depth_image(z_mm, 400, 600, np.ones((1, 3)))
-    np.testing.assert_array_equal(sure, depth_image(z_mm, 400, 600))
+    sure = map_image(z_mm, DEPTH_COLOURS, (400, 600), np.ones((1, 3)))
+    np.testing.assert_array_equal(sure, map_image(z_mm, DEPTH_COLOURS, (400, 600)))
     assert (np.diff(sure.sum(axis=-1, dtype=int)[0]) < 0).all()
-    unsure = depth_image(z_mm, 400, 600, np.full((1, 3), 0.5))
+    unsure = map_image(z_mm, DEPTH_COLOURS, (400, 600), np.full((1, 3), 0.5))
     np.testing.assert_allclose(unsure, (sure + 255.0) / 2, atol=1)

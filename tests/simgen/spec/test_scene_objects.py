@@ -14,7 +14,7 @@ import simgen
 from pcii.base import InputError
 from simgen import Material, Scene, SceneObject, Spectrum, Sphere, load_scene
 from simgen.base import LARGEST_TOML_BYTES, toml_text, validate
-from simgen.spec import scene_names
+from simgen.spec import MitsubaFile, scene_names
 
 RED = Material(reflectance=(0.8, 0.1, 0.1))
 BALL = SceneObject(name="ball", position_mm=(10, 0, 540), shape=Sphere(radius_mm=30), material=RED)
@@ -133,6 +133,8 @@ def test_a_scene_that_ships_is_the_same_once_saved_and_loaded(name: str, tmp_pat
 def test_words_are_the_same_once_saved_and_loaded(words: str, tmp_path: Path) -> None:
     scene = SCENE.change(description=words)
     assert same(load_scene(scene.save(tmp_path)), scene)
+    within = Scene(title="x", mitsuba=MitsubaFile(file="x.xml", unscored=(words,)))
+    assert same(Scene.model_validate(tomllib.loads(toml_text(within))), within)
 
 
 def test_files_go_along_and_saving_again_changes_nothing(tmp_path: Path) -> None:

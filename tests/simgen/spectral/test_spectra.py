@@ -102,6 +102,8 @@ def test_bad_csv_files_are_refused(tmp_path: Path, text: str, message: str) -> N
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         sensitivity("bad.csv", tmp_path)
+    with pytest.raises(InputError, match=r"^sensor\.camera: '\.\./bad\.csv' lies outside the folder"):
+        sensitivity("../bad.csv", tmp_path / "recipes")
 
 
 def test_a_pixel_that_no_lamp_shines_for_is_dark_and_no_fault() -> None:
