@@ -171,7 +171,7 @@ class Submission(BaseModel):
     @property
     def is_run(self) -> bool:
         """Whether the method was run here, and its maps not made elsewhere."""
-        return isinstance(self, ScoredSubmission) and self.made == RUN
+        return False
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -191,6 +191,11 @@ class ScoredSubmission(Submission):
     made: Made
     command_name: Text | None = None
     half: Half
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the method was run here, and its maps not made elsewhere."""
+        return self.made == RUN
 
 
 def read_submission(folder: Path, model: type[AnySubmission]) -> AnySubmission:
