@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError
+from pcii.exchange import open_array
 from pcii.store import DATASET_FOLDER, PACKAGE, hash_file, hash_json, provenance
+from pcii.types import CameraGrid, read_only
 from simgen.assets import read_assets
 from simgen.base import asset
 from simgen.base import random_streams as seeds
@@ -19,8 +21,9 @@ from simgen.cameras import rig_of
 from simgen.dataset.resources import available_bytes, shortage
 from simgen.photons import Capture, Plan, plan_counts
 from simgen.renderer import RenderScene, backend, build
-from simgen.sensor import dark_map, photons_per_radiance, sensitivities
-from simgen.spec import Analysis, Recipe, Scene, checked_folder, load_scene, scene_files
+from simgen.sensor import photons_per_radiance
+from simgen.spec import Analysis, Recipe, Scene, Sensor, checked_folder, load_scene, scene_files
+from simgen.spectral import sensitivity
 
 DECISIVE = (PACKAGE, "mitsuba")
 """Packages whose versions are part of what identifies a dataset, with its recipe and scene."""
@@ -158,6 +161,43 @@ def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = Non
     files, grid = recipe_folder or Path(), recipe.grid.camera_grid()
     curves = sensitivities(recipe.sensor, files)
     return Prepared(resolved, scene, folder, curves, dark_map(recipe.sensor, grid, files))
+
+
+def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:
+    """Relative sensitivities (C, N) of the sensor's camera by wavelength, None in RGB mode.
+
+    A file of sensitivities is looked up in `recipe_folder`. A monochrome sensor takes G, or the one curve
+    that there is. Raises `InputError` for a camera that is not known or has too few curves.
+    """
+    if sensor.camera is None:
+        return None
+    curves = sensitivity(sensor.camera, recipe_folder)
+    if sensor.bayer is None:
+        return curves[len(curves) // 2 :][:1]
+    if len(curves) == 1:
+        raise InputError(
+            f"sensor.camera: {sensor.camera!r} has one curve, and a Bayer sensor needs three; "
+            "set sensor.cfa to 'none'"
+        )
+    return curves
+
+
+def dark_map(sensor: Sensor, grid: CameraGrid, recipe_folder: Path) -> np.ndarray | None:
+    """Mean counts without light, (H, W) or (K, L, H, W) float64, of the file that `sensor.hot_pixels` names.
+
+    None without one. Raises `InputError` for a file that is not in `recipe_folder` or no .npy file, for
+    another shape, and for what are no finite numbers from 0.
+    """
+    if sensor.hot_pixels is None:
+        return None
+    path = asset(recipe_folder, sensor.hot_pixels, "sensor.hot_pixels")
+    counts = open_array(path)
+    if counts.shape not in (grid.shape_HW, grid.shape_KLHW):
+        expected = f"(H, W) = {grid.shape_HW}, or (K, L, H, W) = {grid.shape_KLHW}"
+        raise InputError(f"{path}: expected mean dark counts {expected}, got {counts.shape}")
+    if counts.dtype.kind not in "fiu" or not ((counts >= 0) & (counts < np.inf)).all():
+        raise InputError(f"{path}: expected mean dark counts that are finite numbers from 0")
+    return read_only(np.array(counts, dtype=np.float64))
 
 
 def capture_of(

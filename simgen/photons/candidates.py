@@ -16,6 +16,7 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types import CameraGrid, channel_count, colour_cells
 from simgen.base import random_streams as seeds
+from simgen.base import take_rows
 from simgen.cameras import Cameras, Rig, as_rig, coarser, corners
 from simgen.photons.majorant import Majorant, Samples
 from simgen.renderer import RenderScene
@@ -191,10 +192,21 @@ def nothing(channels: int) -> Accepted:
     return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
 
 
-def is_of_group(cells: list[np.ndarray], group: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
-    """Which pixels (N,) are on a Bayer cell (2 a + b) of their `group` (N,), whose cells are `cells`."""
+def pixels_of(points: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column (N,), int64, of the pixels that points of films lie in."""
+    return points.row.astype(np.int64), points.col.astype(np.int64)
+
+
+def cells_of(points: Any) -> np.ndarray:
+    """Bayer cell 2 a + b (N,) of each of these pixels."""
+    row, col = pixels_of(points)
+    return row % 2 * 2 + col % 2
+
+
+def is_of_group(cells: list[np.ndarray], group: np.ndarray, points: Any) -> np.ndarray:
+    """Which points (N,) are on a Bayer cell of their `group` (N,), whose cells are `cells`."""
     is_cell_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-    return is_cell_of_group[group, row % 2 * 2 + col % 2]
+    return is_cell_of_group[group, cells_of(points)]
 
 
 class FilmPoints(NamedTuple):
@@ -206,8 +218,7 @@ class FilmPoints(NamedTuple):
 
     def on_film(self, grid: CameraGrid) -> "FilmPoints":
         """Those that lie on the film; NaN lies nowhere."""
-        which = is_on_film(grid, self.row, self.col)
-        return FilmPoints(self.view[which], self.row[which], self.col[which])
+        return take_rows(self, is_on_film(grid, self.row, self.col))
 
     @classmethod
     def evenly(cls, grid: CameraGrid, number: int, seed: int) -> "FilmPoints":

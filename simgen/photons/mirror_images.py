@@ -12,10 +12,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from simgen.base import join_rows, take_rows
 from simgen.base import random_streams as seeds
 from simgen.cameras import Rig
 from simgen.photons.bright_light import BrightLight
-from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, is_of_group
+from simgen.photons.candidates import (
+    EXPLORATION_SEED,
+    Capture,
+    FilmPoints,
+    ImageCells,
+    is_of_group,
+    pixels_of,
+)
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
@@ -64,15 +72,14 @@ class MirrorImages:
         """Photons as of `EmissionSampler.draw`."""
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        here = is_of_group(cells, group[candidate], points.row.astype(np.int64), points.col.astype(np.int64))
-        points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
+        here = is_of_group(cells, group[candidate], points)
+        points, candidate, cell = take_rows(points, here), candidate[here], cell[here]
         radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
         number = np.floor(radiance / self.bound[cell] + rng.random(cell.size)).astype(np.int64)
         k, l = np.divmod(points.view, self.grid.cols)
-        i, j = points.row.astype(np.int64), points.col.astype(np.int64)
         origin = {"object_id": object_id, "z_mm": z_mm}
-        photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
+        photons = PhotonTable(k, l, *pixels_of(points), number, **origin).one_by_one()
         return photons, candidate.repeat(number)
 
     def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
@@ -139,7 +146,7 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
         if not points.view.size:
             return points, np.zeros(0)
         brought, *_ = sampler.trace_mirrored(points, above, seed)
-        return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
+        return take_rows(points, brought > 0), brought[brought > 0]
 
     for number, light in enumerate(lights):
         rng = seeds.generator(EXPLORATION_SEED, stage="lamp rays", part=number)
@@ -151,7 +158,7 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
             second, more = send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
             met += [first, second]
             radiance += [brought, more]
-    points, brought = FilmPoints(*map(np.concatenate, zip(*met, strict=True))), np.concatenate(radiance)
+    points, brought = join_rows(met), np.concatenate(radiance)
     if not brought.size:
         return None
     finest = CELLS_ACROSS / np.sqrt(min(light.image_px for light in lights))
@@ -165,7 +172,7 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
 
 def _evenly_by_pixel(points: FilmPoints, number: int, rng: np.random.Generator) -> np.ndarray:
     """Indices (`number`,) of points, half of them drawn evenly and half so that each pixel has as many."""
-    pixel = np.stack([points.view, points.row.astype(np.int64), points.col.astype(np.int64)])
+    pixel = np.stack([points.view, *pixels_of(points)])
     _, which, times = np.unique(pixel, axis=1, return_inverse=True, return_counts=True)
     chance = 1 / times[which.ravel()]
     half = rng.choice(chance.size, number // 2, p=chance / chance.sum())

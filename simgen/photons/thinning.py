@@ -17,6 +17,7 @@ photons come of one path. docs/theory.md has the proof.
 
 import math
 from collections import Counter
+from copy import deepcopy
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -24,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, Report, silent
+from simgen.base import join_rows
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Capture, ranks_in_scopes
 from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore, sampler_class
@@ -105,7 +107,7 @@ class _Drawing:
         self.known_places, self.kept_share = plan.known_places or KnownPlaces([]), plan.kept_share
         self.totals = capture.draw_totals()
         self.number = np.zeros(self.totals.size, dtype=np.int64)
-        self.majorant = None if plan.majorant is None else plan.majorant.copy()
+        self.majorant = None if plan.majorant is None else deepcopy(plan.majorant)
         self.tally = Counter(paths=plan.paths)
 
     def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
@@ -204,9 +206,9 @@ class _Drawing:
             if not parts:
                 return
             assert self.majorant is not None
-            exceeding = Samples.joined(parts)
+            exceeding = join_rows(parts)
             self.tally.update(raises=1, exceeding=exceeding.k.size)
-            below, before = self.majorant.copy(), max(self.tally["candidates"], WAVEFRONT)
+            below, before = deepcopy(self.majorant), max(self.tally["candidates"], WAVEFRONT)
             self.majorant.raise_bounds(exceeding, reach=raises)
             sampler = self.plan.sampler(self.capture, self.majorant, below)
             expected = photons.time * sampler.mass[self.capture.group_of_scope]

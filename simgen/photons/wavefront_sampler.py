@@ -7,7 +7,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film, nothing
+from simgen.photons.candidates import (
+    Accepted,
+    Candidates,
+    CandidateSampler,
+    FilmPoints,
+    cells_of,
+    is_on_film,
+    nothing,
+    pixels_of,
+)
 from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.renderer import (
     FirstHits,
@@ -200,12 +209,11 @@ class WavefrontSampler(CandidateSampler):
         """Candidates of no entry at these points."""
         mi, dr, number = self.mi, self.dr, points.view.size
         k, l = np.divmod(points.view, self.capture.grid.cols)
-        row, col = points.row.astype(np.int64), points.col.astype(np.int64)
-        colour = gathered(self.colour_of_cell, unsigned(mi, row % 2 * 2 + col % 2))
+        colour = gathered(self.colour_of_cell, unsigned(mi, cells_of(points)))
         wavelength_sample = self.light.wavelength_samples(sampler, number)
         return Candidates(
             *(unsigned(mi, camera) for camera in (k, l)),
-            *(signed(mi, pixel) for pixel in (row, col)),
+            *(signed(mi, pixel) for pixel in pixels_of(points)),
             *(floats(mi, place - 0.5) for place in (points.row, points.col)),
             entry=dr.zeros(mi.UInt32, number),
             colour=colour,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simgen.cameras import Rig, film_slopes, slopes_behind_lens
+from simgen.cameras import Rig
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -65,10 +65,9 @@ def film_rays(
         return [_dot([of_camera(row[col]) for col in range(len(vector))], vector) for row in rows]
 
     axis_px = of_camera(rig.axis_px[..., 0]), of_camera(rig.axis_px[..., 1])
-    x, y = film_slopes(rig.grid, row_px, col_px, axis_px)
+    x, y = rig.slopes(row_px, col_px, axis_px, lens_point)
     origin = mi.Point3f(*(of_camera(position[..., axis]) for axis in range(3)))
     if rig.lens is not None:
-        x, y = slopes_behind_lens((x, y), rig.lens, (lens_point.x, lens_point.y))
         origin += mi.Vector3f(*rotate(lens_point.x, lens_point.y, factor=frame.unit))
     direction = load_drjit().normalize(mi.Vector3f(*rotate(x, y, mi.Float(1))))
     return mi.RayDifferential3f(mi.Ray3f(origin, direction))
