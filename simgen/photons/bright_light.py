@@ -122,14 +122,12 @@ def mirrored_light(
     tracer = LampTracer(render_scene, capture.rig, capture.cfa, disc_mm)
     known = set() if render_scene.why_rendered else {one.number for one in render_scene.shining}
     is_known = np.array([number in known for number in tracer.objects], dtype=bool)
-    if not (tracer.has_mirrors or (with_straight and not is_known.all())):
+    if not tracer.lamps or not (tracer.has_mirrors or (with_straight and not is_known.all())):
         return []
     least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
-    survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % max(len(tracer.lamps), 1)
-    is_bright = (
-        tracer.radiance_of(survey, seeds.integer(EXPLORATION_SEED, stage="lamp rays")) > least_radiance
-    )
-    lamps = np.unique(survey[is_bright]) if len(tracer.lamps) else survey[:0]
+    survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % len(tracer.lamps)
+    radiance = tracer.radiance_of(survey, seeds.integer(EXPLORATION_SEED, stage="lamp rays"))
+    lamps = np.unique(survey[radiance > least_radiance])
     if not lamps.size:
         return []
     is_searched = ~is_known & with_straight
