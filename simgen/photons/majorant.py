@@ -117,8 +117,7 @@ class DisparityLayers:
 
     def layer_row_col(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Layer, row and column of flat indices."""
-        rest, col = np.divmod(tiles, self.cols)
-        layer, row = np.divmod(rest, self.rows)
+        layer, row, col = np.unravel_index(tiles, (len(self.row_shift), self.rows, self.cols))
         return layer, row, col
 
     def around(self, tiles: np.ndarray, reach: int = 1) -> np.ndarray:
@@ -196,6 +195,11 @@ class Majorant:
         self.bound = np.tile(DIM_MARGIN * dim, (self.coarse_count, 1))
         self.radiance_ratio_bound = np.full(self.bound.shape, ENDLESS)
         self.entry_of = np.full(layers.tiles, -1, dtype=np.int32)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both bounds of every entry."""
+        return self.bound, self.radiance_ratio_bound
 
     @property
     def side_px(self) -> np.ndarray:
@@ -280,7 +284,7 @@ class Majorant:
     def _raise_entries(self, entries: np.ndarray, exceeding: Samples) -> None:
         """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
         light, ratio = exceeding.light, exceeding.light / exceeding.guess
-        for levels, needed in ((self.bound, light), (self.radiance_ratio_bound, ratio)):
+        for levels, needed in zip(self.bounds, (light, ratio), strict=True):
             _raise_rows(levels, entries.ravel(), RAISE_FACTOR * needed.repeat(entries.shape[1], axis=0))
 
     def is_above(self, below: "Majorant") -> np.ndarray:

@@ -9,6 +9,7 @@ each ray, and needs a compiled backend.
 
 from collections.abc import Sequence
 from itertools import product
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,12 +95,12 @@ def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
     # Multiples of the golden ratio, less their whole parts, are evenly spread.
     multiple = number * ((5**0.5 - 1) / 2)
-    wavelength_sample = multiple - dr.floor(multiple)
     total: Any = 0.0
     for colour in light.colours_to_follow(dr.zeros(mi.UInt32, DIRECTIONS)):
-        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, DIRECTIONS), colour, wavelength_sample).wavelengths
+        pixels = SimpleNamespace(colour=colour, wavelength_sample=multiple - dr.floor(multiple))
+        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, DIRECTIONS), pixels).wavelengths
         radiance = mi.Spectrum(0) if around is None else around.eval(away)
-        visible = np.array(light.per_colour(radiance, colour, wavelength_sample))
+        visible = np.array(light.per_colour(radiance, pixels))
         total += visible.mean(axis=1, dtype=np.float64)
     return total
 

@@ -22,10 +22,10 @@ from simgen.spec import Recipe
 from simgen.truth import (
     FirstHits,
     coverage,
-    first_hits,
     first_hits_at_centre,
     first_hits_of_view,
     in_focus,
+    truth_file,
     visible_views,
 )
 
@@ -335,7 +335,7 @@ def test_no_ray_is_skipped_that_could_be_blocked(
         scene = build(backend.load(), world, tmp_path, 2)
     hits = first_hits_at_centre(scene, of)
     views, traced = visible_views(scene, of, hits)
-    monkeypatch.setattr(first_hits, "_can_be_blocked", lambda *given: np.ones(len(given[2]), dtype=bool))
+    monkeypatch.setattr(truth_file, "_can_be_blocked", lambda *given: np.ones(len(given[2]), dtype=bool))
     exhaustive, all_rays = visible_views(scene, of, hits)
     np.testing.assert_array_equal(views, exhaustive)
     assert exhaustive[np.isfinite(hits.z_mm)].min() < 12
