@@ -9,6 +9,6 @@ from .rendered_views import draw_counts as draw_counts, draw_from_views as draw_
 from .rendered_views import exact_view as exact_view, fixed_totals as fixed_totals
 from .rendered_views import full_light_image as full_light_image, halved_view as halved_view
 from .rendered_views import write_counts as write_counts
-from .resources import available_bytes as available_bytes, check_resources as check_resources
-from .resources import in_bytes as in_bytes, peak_bytes as peak_bytes, product_bytes as product_bytes
-from .resources import shortage as shortage
+from .prepared import available_bytes as available_bytes, check_resources as check_resources
+from .prepared import in_bytes as in_bytes, peak_bytes as peak_bytes, product_bytes as product_bytes
+from .prepared import shortage as shortage

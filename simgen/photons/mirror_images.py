@@ -141,33 +141,33 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
     grid, above = sampler.capture.grid, LEAST_PEAK * float(min(peaks))
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
 
-    def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
-        seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
-        if not points.view.size:
-            return points, np.zeros(0)
-        brought, *_ = sampler.trace_mirrored(points, above, seed)
-        return take_rows(points, brought > 0), brought[brought > 0]
+    def send(points: FilmPoints, part: int) -> FilmPoints:
+        if points.view.size:
+            seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
+            brought, *_ = sampler.trace_mirrored(points, above, seed)
+            points = take_rows(points, brought > 0)
+            met.append(points)
+            radiance.append(brought[brought > 0])
+        return points
 
     for number, light in enumerate(lights):
         rng = seeds.generator(EXPLORATION_SEED, stage="lamp rays", part=number)
-        first, brought = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
+        first = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
         if first.view.size:
             around = _evenly_by_pixel(first, MORE_PATHS, rng)
             aside_px = rng.standard_normal((2, MORE_PATHS)) * np.sqrt(light.image_px)
             row, col = first.row[around] + aside_px[0], first.col[around] + aside_px[1]
-            second, more = send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
-            met += [first, second]
-            radiance += [brought, more]
+            send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
     points, brought = join_rows(met), np.concatenate(radiance)
     if not brought.size:
         return None
     finest = CELLS_ACROSS / np.sqrt(min(light.image_px for light in lights))
     per_px = int(np.clip(2 ** np.ceil(np.log2(finest)), 1, MAX_CELLS_PER_PX))
-    cells, bound = _cells_around(sampler.capture, points, brought, per_px)
-    while cells.size > MAX_CELLS:
-        per_px //= 2
+    while True:
         cells, bound = _cells_around(sampler.capture, points, brought, per_px)
-    return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
+        if cells.size <= MAX_CELLS:
+            return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
+        per_px //= 2
 
 
 def _evenly_by_pixel(points: FilmPoints, number: int, rng: np.random.Generator) -> np.ndarray:
@@ -233,14 +233,11 @@ def _cells_around(
     largest radiance (M,) of points in each and beside it."""
     height, width = capture.grid.height * per_px, capture.grid.width * per_px
     row, col = ((part * per_px).astype(np.int64) for part in (points.row, points.col))
-    numbers, values = list[np.ndarray](), list[np.ndarray]()
-    for down, right in np.ndindex(3, 3):
-        i, j = row + down - 1, col + right - 1
-        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
-        number = (points.view.astype(np.int64) * height + i) * width + j
-        numbers.append(number[inside])
-        values.append(radiance[inside])
-    cells, index = np.unique(np.concatenate(numbers), return_inverse=True)
+    down, right = np.indices((3, 3)).reshape(2, -1, 1) - 1
+    i, j = row + down, col + right
+    inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+    number = (points.view.astype(np.int64) * height + i) * width + j
+    cells, index = np.unique(number[inside], return_inverse=True)
     largest = np.zeros(cells.size)
-    np.maximum.at(largest, index, np.concatenate(values))
+    np.maximum.at(largest, index, np.broadcast_to(radiance, inside.shape)[inside])
     return cells.astype(np.uint64), largest

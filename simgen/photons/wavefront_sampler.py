@@ -3,6 +3,7 @@
 What leaves is NumPy.
 """
 
+from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
@@ -118,7 +119,11 @@ class WavefrontSampler(CandidateSampler):
         self.require_finite(np.array(ratio), candidates, self._objects(first))
         exceeding = nothing(capture.channels).exceeding
         if len(over):
-            exceeding = self._exceeding(candidates, first, light, over)
+            candidates, first = _take(candidates, over), _take(first, over)
+            both = first.guess, gathered(light, over)
+            guess, light = (self.light.per_colour(radiance, candidates) for radiance in both)
+            dr.eval(*candidates, first.z_mm, guess, light)
+            exceeding = _samples(candidates, first.z_mm, guess, light)
         k, l, i, j = (np.array(part) for part in photon[:4])
         origin = {"object_id": self._objects(hit), "z_mm": np.array(hit.z_mm)}
         photons = PhotonTable(k, l, i, j, np.ones(len(accepted), np.int64), **origin)
@@ -136,10 +141,8 @@ class WavefrontSampler(CandidateSampler):
             followed, first_of_followed = _take(recoloured, some), _take(first, some)
             radiance = self._follow(followed, first_of_followed, seed, turn)
             self.require_finite(np.array(dr.sum(radiance)), followed, self._objects(first_of_followed))
-            guess = [
-                a + b for a, b in zip(guess, self.light.per_colour(first.guess, recoloured), strict=True)
-            ]
-            light = [a + b for a, b in zip(light, self.light.per_colour(radiance, followed), strict=True)]
+            guess = list(map(add, guess, self.light.per_colour(first.guess, recoloured)))
+            light = list(map(add, light, self.light.per_colour(radiance, followed)))
             dr.eval(guess, light)
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
@@ -303,13 +306,6 @@ class WavefrontSampler(CandidateSampler):
     def _objects(self, first: FirstHits) -> np.ndarray:
         """Object ids (N,) of what is hit first."""
         return self.capture.render_scene.object_of_shape[np.array(first.shape)]
-
-    def _exceeding(self, candidates: Candidates, first: FirstHits, light: Any, over: Any) -> Samples:
-        candidates, first = _take(candidates, over), _take(first, over)
-        both = first.guess, gathered(light, over)
-        guess, light_over = (self.light.per_colour(radiance, candidates) for radiance in both)
-        self.dr.eval(*candidates, first.z_mm, guess, light_over)
-        return _samples(candidates, first.z_mm, guess, light_over)
 
 
 def _take(rows: Rows, index: Any) -> Rows:
