@@ -36,8 +36,7 @@ class Capture:
     """A scene in the renderer, cameras, the Bayer pattern `cfa`, the light that is counted, and the seed.
 
     `photons_per_radiance` are the photons that a pixel catches of a unit of radiance, for an exposure; None
-    for a budget. `dark_map` is what pixels count without any, as of `detect`. Raises ValueError for an
-    exposure without `photons_per_radiance`, and for a budget with it.
+    for a budget. `dark_map` is what pixels count without any, as of `detect`.
     """
 
     render_scene: RenderScene
@@ -47,12 +46,6 @@ class Capture:
     photons_per_radiance: float | None = None
     seed: int = 0
     dark_map: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        if (self.photons_per_radiance is None) == (self.photons.scope == "exposure"):
-            raise ValueError(
-                "photons_per_radiance: needed for photons of scope 'exposure', and for no others"
-            )
 
     @cached_property
     def rig(self) -> Rig:
@@ -93,6 +86,11 @@ class Capture:
             return [np.arange(4)]
         cells = colour_cells(self.cfa).ravel()
         return [np.flatnonzero(cells == colour) for colour in range(self.channels)]
+
+    @cached_property
+    def is_cell_of_group(self) -> np.ndarray:
+        """Whether each of these groups has each Bayer cell, (G, 4) bool."""
+        return np.array([np.isin(np.arange(4), cells) for cells in self.cell_groups])
 
     @property
     def has_one_budget(self) -> bool:
@@ -203,12 +201,6 @@ def cells_of(points: Any) -> np.ndarray:
     return row % 2 * 2 + col % 2
 
 
-def is_of_group(cells: list[np.ndarray], group: np.ndarray, points: Any) -> np.ndarray:
-    """Which points (N,) are on a Bayer cell of their `group` (N,), whose cells are `cells`."""
-    is_cell_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-    return is_cell_of_group[group, cells_of(points)]
-
-
 class FilmPoints(NamedTuple):
     """Points (N,) of films: view, and row and column from the film's corner in [0, H) and [0, W)."""
 
@@ -289,7 +281,8 @@ class CandidateSampler(ABC):
         majorant = self.majorant
         bound = majorant.bound * (majorant.side_px**2 / 4)[:, None]
         if self.below is not None:
-            bound *= majorant.is_above(self.below)[:, None]
+            both = zip(majorant.bounds, self.below.bounds, strict=True)
+            bound *= np.any([above > below for above, below in both], axis=(0, 2))[:, None]
         self.colours = colour_cells(self.capture.cfa).ravel()
         self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in self.capture.cell_groups]
         self.mass = np.array([sums[-1] for sums in self.running])

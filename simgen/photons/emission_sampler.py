@@ -29,7 +29,7 @@ from pcii.types import colour_cells
 from simgen.assets import across_faces
 from simgen.base import join_rows, take_rows
 from simgen.cameras import Rig, as_rig, corners
-from simgen.photons.candidates import Capture, cells_of, is_of_group, is_on_film, pixels_of
+from simgen.photons.candidates import Capture, cells_of, is_on_film, pixels_of
 from simgen.renderer import ShiningSurface
 from simgen.sensor import PhotonTable
 
@@ -243,15 +243,13 @@ class EmissionSampler:
             self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
             self.mass = float(self.running[-1]) if self.running.size else 0.0
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
-        """Photons of a candidate for each of `group` (N,) on the film of `view` (N,), and whose each is.
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
+        """Photons of a candidate on each film of `view` (N,), and whose each is.
 
-        `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
+        What falls on other Bayer cells than its `cells` (N, 4) bool is rejected.
         """
         candidate, points, _ = self.arriving(view, np.random.default_rng(seed))
-        here = is_of_group(cells, group[candidate], points)
+        here = cells[candidate, cells_of(points)]
         candidate, points = candidate[here], take_rows(points, here)
         k, l = np.divmod(view[candidate], self.capture.grid.cols)
         origin = {"object_id": self.numbers[points.surface], "z_mm": points.point_mm[:, 2]}

@@ -332,8 +332,7 @@ def _kept_share(capture: Capture, known: EmissionSampler | MirrorImages | KnownP
         return 0.0
     view = np.arange(AIMED_RAYS) % capture.grid.view_count
     path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-    photons, _ = known.draw(np.zeros_like(view), view, [np.arange(4)], path_seed)
-    return photons.k.size / AIMED_RAYS
+    return known.draw(np.ones((AIMED_RAYS, 4), bool), view, path_seed)[0].k.size / AIMED_RAYS
 
 
 def _warm_up(

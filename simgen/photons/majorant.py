@@ -287,11 +287,6 @@ class Majorant:
         for levels, needed in zip(self.bounds, (light, ratio), strict=True):
             _raise_rows(levels, entries.ravel(), RAISE_FACTOR * needed.repeat(entries.shape[1], axis=0))
 
-    def is_above(self, below: "Majorant") -> np.ndarray:
-        """Which entries have been raised since `below` was copied, (E,) bool."""
-        raised = (self.bound > below.bound) | (self.radiance_ratio_bound > below.radiance_ratio_bound)
-        return np.asarray(raised.any(axis=1))
-
 
 def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.ndarray) -> Majorant:
     """The majorant that a pilot suggests; `dim` (C,) is the bound of the coarse tiles.

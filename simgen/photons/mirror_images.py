@@ -14,16 +14,8 @@ import numpy as np
 
 from simgen.base import join_rows, take_rows
 from simgen.base import random_streams as seeds
-from simgen.cameras import Rig
 from simgen.photons.bright_light import BrightLight
-from simgen.photons.candidates import (
-    EXPLORATION_SEED,
-    Capture,
-    FilmPoints,
-    ImageCells,
-    is_of_group,
-    pixels_of,
-)
+from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, cells_of, pixels_of
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
@@ -66,13 +58,11 @@ class MirrorImages:
         self.of_view = self.running[np.searchsorted(cells.number, first)]
         self.mass = float(np.diff(self.of_view).max())
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
         """Photons as of `EmissionSampler.draw`."""
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        here = is_of_group(cells, group[candidate], points)
+        here = cells[candidate, cells_of(points)]
         points, candidate, cell = take_rows(points, here), candidate[here], cell[here]
         radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
@@ -118,9 +108,7 @@ class KnownPlaces:
         """Cells in which images of lamps are drawn, which paths through the film leave out."""
         return next((part.cells for part in self.parts if isinstance(part, MirrorImages)), None)
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
         """Photons as of `EmissionSampler.draw`."""
         which = np.zeros(view.size, dtype=np.int64)
         if len(self.parts) > 1:
@@ -129,7 +117,7 @@ class KnownPlaces:
         tables, candidates = [no_photons()], [np.zeros(0, dtype=np.int64)]
         for number, part in enumerate(self.parts):
             here = np.flatnonzero(which == number)
-            photons, candidate = part.draw(group[here], view[here], cells, seed)
+            photons, candidate = part.draw(cells[here], view[here], seed)
             tables.append(photons)
             candidates.append(here[candidate])
         return joined(tables), np.concatenate(candidates)
@@ -205,7 +193,10 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
         off_px = np.linalg.norm(seen_px - design @ fitted, axis=2, keepdims=True)
         usual_px = np.maximum(np.median(off_px, axis=1, keepdims=True), MIN_SPREAD_PX)
         weight = 1 / np.sqrt(1 + (off_px / usual_px) ** 2)
-    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(capture.rig, fitted)
+    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px)
+    if (lens := capture.rig.lens) is not None:  # whose images are blurred as they move over it
+        moves_px = fitted[:, 1:] + np.eye(2)[::-1] * (grid.focal_mm / grid.pixel_mm) / lens.focus_mm
+        spread_px += lens.aperture_mm / 2 * np.abs(moves_px).sum(axis=1).max(axis=1)
     paths = (FIRST_HITS * 2 * np.pi * spread_px**2 / light.image_px).sum()
     moved_px = (seen_px - aside_mm @ fitted[:, 1:]).reshape(-1, 2) + 0.5
     points = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
@@ -215,15 +206,6 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
     aside_px = rng.standard_normal((2, which.size)) * spread_px[points.view[which]]
     row, col = points.row[which] + aside_px[0], points.col[which] + aside_px[1]
     return FilmPoints(points.view[which], row, col).on_film(grid)
-
-
-def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:
-    """Radius (V,) of the blur of an image that moves by `fitted` (V, 3, 2) px per mm; 0 of pinholes."""
-    if rig.lens is None:
-        return np.zeros(len(fitted))
-    scale_px = rig.grid.focal_mm / rig.grid.pixel_mm
-    per_mm = np.abs(fitted[:, 1:] + np.eye(2)[::-1] * scale_px / rig.lens.focus_mm).sum(axis=1).max(axis=1)
-    return rig.lens.aperture_mm / 2 * per_mm
 
 
 def _cells_around(

@@ -119,10 +119,8 @@ class _Drawing:
             else:
                 self._expose(photons, gain)
             self._draw_above(photons)
-        table = photons.first_of_each()
-        assert table.scope is not None
-        self.number += np.bincount(table.scope, minlength=wanted.size)
-        return table
+        self.number += np.minimum(photons.number, wanted)
+        return photons.first_of_each()
 
     def draw_counts(self) -> PhotonTable:
         """A row for each pixel that caught photons, drawn in parts that memory holds.
@@ -242,9 +240,9 @@ class _Drawing:
         emits: bool = False,
     ) -> None:
         """Candidates of some scopes, from time `begin` on: of films, and with `emits` of what shines."""
-        numbers = {"seed": self.capture.seed, "round_number": self.tally["rounds"]}
-        rng = seeds.generator(stage="candidate numbers", **numbers)
         capture, known, tally = self.capture, self.known_places, self.tally
+        numbers = {"seed": capture.seed, "round_number": tally["rounds"]}
+        rng = seeds.generator(stage="candidate numbers", **numbers)
         candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
         def add(table: PhotonTable, candidate: np.ndarray, number: np.ndarray, paths: int) -> None:
@@ -270,8 +268,8 @@ class _Drawing:
             if capture.has_one_budget:
                 view = rng.integers(0, self.capture.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            drawn = known.draw(capture.group_of_scope[scope], view, capture.cell_groups, path_seed)
-            add(*drawn, number, scope.size)
+            cells = capture.is_cell_of_group[capture.group_of_scope[scope]]
+            add(*known.draw(cells, view, path_seed), number, scope.size)
         tally["rounds"] += 1
         if emits:
             candidates = max(tally["candidates"] - candidates_before, 1)
