@@ -23,7 +23,7 @@ from simgen.dataset.generation import Reuse, make
 from simgen.photons import Capture, Plan, explore, thin_photons
 from simgen.renderer import RenderScene
 from simgen.spec import Recipe
-from simgen.truth import first_hits, first_hits_at_centre, visible_views
+from simgen.truth import first_hits_at_centre, truth_file, visible_views
 
 Arrays = Mapping[str, np.ndarray]
 DEPTH = f"{TRUTH}/z_mm"
@@ -141,7 +141,7 @@ def _visible(world: World, *, tests_all: bool) -> Arrays:
     hits = first_hits_at_centre(world.scene, world.capture.grid)
     if not tests_all:
         return {"views": visible_views(world.scene, world.capture.grid, hits)[0]}
-    with patch.object(first_hits, "_can_be_blocked", lambda _, __, start: np.ones(len(start), bool)):
+    with patch.object(truth_file, "_can_be_blocked", lambda _, __, start: np.ones(len(start), bool)):
         return {"views": visible_views(world.scene, world.capture.grid, hits)[0]}
 
 

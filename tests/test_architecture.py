@@ -38,7 +38,6 @@ KNOW_RECIPE = {
     "simgen.check.targets",
     "simgen.dataset.generation",
     "simgen.dataset.prepared",
-    "simgen.dataset.resources",
     "simgen.spec.recipe_files",
 }
 

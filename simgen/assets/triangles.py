@@ -124,6 +124,11 @@ def barycentric(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         return np.stack([1 - second - third, second, third], axis=-1)
 
 
+def across_faces(corners: np.ndarray) -> np.ndarray:
+    """Normals (M, 3) of triangles (M, 3, 3), as long as twice their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def triangles_of(shape: Shape, meshes: Mapping[str, Triangles]) -> Triangles:
     """A shape as triangles in mm, a sphere as a `globe`; `meshes` are those of files by name.
 
@@ -235,8 +240,7 @@ def surface_points(mesh: Triangles, number: int) -> SurfacePoints:
         mixed = np.einsum("pc,mcd->mpd", shares, values.astype(np.float64)[mesh.faces])
         return mixed.reshape(-1, values.shape[1])
 
-    corner = mesh.positions.astype(np.float64)[mesh.faces]
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    across = across_faces(mesh.positions.astype(np.float64)[mesh.faces])
     doubled = np.linalg.norm(across, axis=1)
     normal = np.repeat(across / np.where(doubled > 0, doubled, 1)[:, None], n * n, axis=0)
     texcoord = None if mesh.texcoords is None else at_points(mesh.texcoords)

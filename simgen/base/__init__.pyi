@@ -1,4 +1,5 @@
 from . import random_streams as random_streams
+from .columns import join_rows as join_rows, take_rows as take_rows
 from .file_lookup import asset as asset, AssetName as AssetName, cache_folder as cache_folder
 from .file_lookup import cached as cached, check_installed as check_installed
 from .file_lookup import EnvironmentName as EnvironmentName, find as find, find_all as find_all

@@ -54,22 +54,17 @@ def share_seen_by_all(grid: CameraGrid, z_mm: float) -> float:
     return share
 
 
-def colour_samples(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray:
-    """Samples of each colour that meet in the voxels of the section at z: (2, 2, C), int64.
+def shares_without(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray:
+    """Share of the voxels of the section at z that no sample of each colour reaches, (C,).
 
-    By the parity of the voxel's row and column, away from the section's border, where every camera
-    reaches. A camera adds the colour of the pixel that it was shifted from.
+    What meets in a voxel depends on the parity of its row and column, away from the section's border, where
+    every camera reaches: a camera adds the colour of the pixel that it was shifted from.
     """
     cells, samples = colour_cells(cfa), np.zeros((2, 2, channel_count(cfa)), dtype=np.int64)
     parities = [np.bincount(shift % 2, minlength=2) for shift in shifts_px(grid, z_mm)]
     for row, col, up, left in np.ndindex(2, 2, 2, 2):
         samples[row, col, cells[(row - up) % 2, (col - left) % 2]] += parities[0][up] * parities[1][left]
-    return samples
-
-
-def shares_without(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray:
-    """Share of the voxels of the section at z that no sample of each colour reaches, (C,)."""
-    return (colour_samples(grid, cfa, z_mm) == 0).mean(axis=(0, 1))
+    return (samples == 0).mean(axis=(0, 1))
 
 
 def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[float, float] | None:
@@ -83,10 +78,7 @@ def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[floa
         pitch = tuple(round(factor * old, 2) if old >= 1 else factor * old for old in grid.pitch_mm)
         changed = replace(grid, pitch_mm=pitch)
         parities = [shift % 2 for z in depths_mm for shift in shifts_px(changed, z)]
-        rarer = [min(odd.sum(), odd.size - odd.sum()) for odd in parities]
-        if all(
-            count >= max(1, int(MIN_PARITY_SHARE * odd.size))
-            for count, odd in zip(rarer, parities, strict=True)
-        ):
+        least = [max(1, int(MIN_PARITY_SHARE * odd.size)) for odd in parities]
+        if all(n <= odd.sum() <= odd.size - n for n, odd in zip(least, parities, strict=True)):
             return changed.pitch_mm
     return None

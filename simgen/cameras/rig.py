@@ -15,21 +15,13 @@ from simgen.base import random_streams as seeds
 from simgen.spec import Grid, Lens
 
 
-def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:
+def _film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:
     """Slopes (x, y) of chief rays through points of the film, in mm to the right and down per mm ahead.
 
     The camera's axis meets the film at `axis_px`, (column, row). All are numbers or arrays of one kind.
     """
     per_px = grid.pixel_mm / grid.focal_mm
     return (col_px - axis_px[0]) * per_px, (row_px - axis_px[1]) * per_px
-
-
-def slopes_behind_lens(slopes: tuple[Any, Any], lens: Lens, point_mm: tuple[Any, Any]) -> tuple[Any, Any]:
-    """Slopes (x, y) of rays of the same film points that leave from a point (x, y) of a thin lens.
-
-    All rays of a film point meet where the chief ray, through the lens's centre, is in focus.
-    """
-    return slopes[0] - point_mm[0] / lens.focus_mm, slopes[1] - point_mm[1] / lens.focus_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +43,7 @@ class Camera:
         grid, (right, down) = self.grid, self.shift_px
         axis_px = (grid.width - 1) / 2 + right, (grid.height - 1) / 2 + down
         row_px, col_px = (np.asarray(px, dtype=np.float64) for px in (row_px, col_px))
-        x, y = film_slopes(grid, row_px, col_px, axis_px)
+        x, y = _film_slopes(grid, row_px, col_px, axis_px)
         return np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1) @ self.rotation.T
 
     def on_film(self, point_mm: np.ndarray) -> np.ndarray:
@@ -118,6 +110,17 @@ class Rig:
         radius, turn = self.lens.aperture_mm / 2 * np.sqrt(numbers[0]), 2 * np.pi * numbers[1]
         return radius * np.stack([np.cos(turn), np.sin(turn)])
 
+    def slopes(self, row_px: Any, col_px: Any, axis_px: tuple[Any, Any], lens_point: Any) -> tuple[Any, Any]:
+        """Slopes (x, y), as of `_film_slopes`, of rays through points of films and points (x, y) of the lens.
+
+        All rays of a film point meet where the chief ray, through the lens's centre, is in focus. Pinholes do
+        not use `lens_point`, in mm.
+        """
+        x, y = _film_slopes(self.grid, row_px, col_px, axis_px)
+        if self.lens is None:
+            return x, y
+        return x - lens_point[0] / self.lens.focus_mm, y - lens_point[1] / self.lens.focus_mm
+
     def film_px(
         self, view: np.ndarray, away_mm: np.ndarray, lens_point: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -145,16 +148,14 @@ class Rig:
     def rays(
         self, k: np.ndarray, l: np.ndarray, row_px: np.ndarray, col_px: np.ndarray, lens_point: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Origins and unit directions (N, 3) of rays through points of films and of the lens (2, N).
+        """Origins and unit directions (N, 3) of rays through points of films and of the lens (2, N) in mm.
 
-        `path_tracing.film_rays` makes the same on the renderer's side. `lens_point` in mm is not used for
-        pinholes.
+        `path_tracing.film_rays` makes the same on the renderer's side.
         """
         axis_px = self.axis_px[k, l]
-        x, y = film_slopes(self.grid, row_px, col_px, (axis_px[:, 0], axis_px[:, 1]))
+        x, y = self.slopes(row_px, col_px, (axis_px[:, 0], axis_px[:, 1]), lens_point)
         origin, rotation = self.position_mm[k, l], self.rotation[k, l]
         if self.lens is not None:
-            x, y = slopes_behind_lens((x, y), self.lens, (lens_point[0], lens_point[1]))
             origin = origin + np.einsum("nab,bn->na", rotation[..., :2], lens_point)
         ahead = 1 / np.sqrt(1 + x * x + y * y)
         direction = np.stack([x * ahead, y * ahead, ahead], axis=1)

@@ -18,7 +18,7 @@ from simgen.dataset import Prepared, available_bytes
 from simgen.photons import Plan
 from simgen.renderer import RenderScene, backend, render_view
 from simgen.spec import AreaLight, EnvironmentLight, Scene, SpotLight, UniformLight
-from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
+from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
@@ -216,10 +216,10 @@ def _is_cut(mask: np.ndarray) -> bool:
 
 def _boxes_mm(render_scene: RenderScene) -> dict[int, np.ndarray]:
     """Bounding boxes (2, 3) of the objects by number, smallest and largest X, Y, Z in mm."""
-    boxes_mm = shape_boxes_mm(render_scene)
     object_of_box = render_scene.object_of_shape[backend.shape_numbers(render_scene.scene)]
-    parts = {number: boxes_mm[object_of_box == number] for number in set(object_of_box.tolist()) - {0}}
-    return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in parts.items()}
+    numbers, corners_mm = set(object_of_box.tolist()) - {0}, render_scene.corners_mm
+    parts = ((number, corners_mm[object_of_box == number].reshape(-1, 3)) for number in numbers)
+    return {number: np.array([part.min(axis=0), part.max(axis=0)]) for number, part in parts}
 
 
 def _lamps_away(scene: Scene, boxes_mm: list[np.ndarray]) -> tuple[int, ...]:

@@ -299,13 +299,7 @@ def _croissant(definition: Definition, terms: Terms, index_sha256: str) -> dict[
     }
 
 
-def published_certificate(file: Path) -> dict[str, Any]:
-    """The certificate of the published datasets: a file beside that of the definition; empty without one."""
-    published = file.with_suffix(f".{CERTIFICATE}")
-    return json.loads(published.read_text()) if published.is_file() else {}
-
-
-def content_of(dataset: Dataset) -> Content:
+def _content_of(dataset: Dataset) -> Content:
     """What a dataset is compared by."""
     files = {name: entry["sha256"] for name, entry in dataset.manifest.files.items()}
     content: dict[str, Any] = {"sha256": hash_json(files)}
@@ -356,9 +350,11 @@ def certify(definition: Definition, file: Path, out: Path, report: Report = sile
     contents: dict[str, Content] = {}
     collection = open_collection(out)
     for row, dataset in zip(collection.rows, collection, strict=True):
-        contents[row["path"]] = content_of(dataset)
+        contents[row["path"]] = _content_of(dataset)
         report("certificate", len(contents), len(collection))
-    verdict = compare(contents, published_certificate(file).get("datasets", {}))
+    published = file.with_suffix(f".{CERTIFICATE}")  # that of the published datasets, if they are
+    known = json.loads(published.read_text())["datasets"] if published.is_file() else {}
+    verdict = compare(contents, known)
     document = {
         "benchmark": definition.name,
         "definition_sha256": hash_json(definition.model_dump(mode="json")),

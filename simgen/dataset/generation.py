@@ -36,7 +36,7 @@ from pcii.store import (
     pack_arrays,
     read_listed,
 )
-from simgen.dataset.prepared import DECISIVE, Prepared, other_dataset, prepare, versions
+from simgen.dataset.prepared import DECISIVE, Prepared, check_resources, other_dataset, prepare, versions
 from simgen.dataset.rendered_views import (
     RENDERED,
     RenderedViews,
@@ -44,7 +44,6 @@ from simgen.dataset.rendered_views import (
     draw_from_views,
     write_counts,
 )
-from simgen.dataset.resources import check_resources
 from simgen.photons import Capture, Plan, thin_photons
 from simgen.renderer import RenderScene, backend
 from simgen.sensor import PhotonTable

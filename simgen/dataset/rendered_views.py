@@ -30,7 +30,7 @@ from simgen.base import random_streams as seeds
 from simgen.photons import MAX_NOISE_SHARE, Capture, Plan, ranks_in_scopes
 from simgen.renderer import render_view, windows_of_objects
 from simgen.sensor import PhotonTable, detector, full_light_image, photons_per_radiance
-from simgen.spec import MOST_PHOTONS, Exposure, Render, Sensor
+from simgen.spec import MOST_PHOTONS, Exposure, Photons, Render, Sensor
 
 RENDERED = ".rendered"
 """Folder of exact views that are no product in themselves; gone when the dataset is finished."""
@@ -181,12 +181,12 @@ def draw_from_views(
             f"their own variance to the counts, and {MAX_NOISE_SHARE:g} is allowed, as some light comes in "
             f"rare and bright paths; take at most {most:.2g} photons per view, larger lamps or rougher metals"
         )
-    totals = detector.fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
+    totals = fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns = []
     for number, (k, l) in enumerate(views):
         rates = _photon_rates(capture, view_of(k, l)[0], normalisers[number], (k, l))
         rng = seeds.generator(capture.seed, view=number, stage="photons")
-        counts = detector.draw_counts(rates, cfa, rng, None if totals is None else totals[number])
+        counts = draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", number + 1, len(views))
@@ -203,6 +203,42 @@ def draw_from_views(
         "normaliser_standard_error": plan.normaliser_error,
         "bright_light_forecast": [light.log for light in plan.bright_light],
     }
+
+
+def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
+    """Photons of each view (V, C or 1) for multinomial statistics, None for Poisson.
+
+    `energies` (V, C or 1) are those of `scope_energies`. With scope "scene" the budget is shared
+    among the views at random in proportion to their light; else each scope gets it exactly. A scope
+    without light gets none.
+    """
+    if photons.statistics == "poisson":
+        return None
+    budget = round(photons.budget)
+    if photons.scope == "scene":
+        total = energies.sum()
+        share = rng.multinomial(budget, energies[:, 0] / total) if total > 0 else energies[:, 0] * 0
+        return share[:, None].astype(np.int64)
+    return np.where(energies > 0, budget, 0)
+
+
+def draw_counts(
+    rates: np.ndarray, cfa: str | None, rng: np.random.Generator, totals: np.ndarray | None
+) -> np.ndarray:
+    """Photon counts (H, W), int64: Poisson with mean `rates`, or multinomial with fixed `totals`.
+
+    `totals` holds one number for the view, or one for each colour.
+    """
+    if totals is None:
+        return rng.poisson(rates)
+    counts, colours = np.zeros(rates.shape, dtype=np.int64), np.zeros(rates.shape, np.uint8)
+    if totals.size > 1:
+        colours = colour_index(rates.shape[0], rates.shape[1], cfa)
+    for colour, total in enumerate(totals):
+        mask = colours == colour
+        if total > 0:
+            counts[mask] = rng.multinomial(total, rates[mask] / rates[mask].sum())
+    return counts
 
 
 def _photon_rates(

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from simgen.base import join_rows, take_rows
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import (
     EXPLORATION_SEED,
@@ -99,13 +100,11 @@ def straight_light(capture: Capture) -> list[BrightLight]:
     if not emission.mass or capture.render_scene.why_rendered:
         return []
     rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=2)
-    arriving = emission.arriving(np.arange(STRAIGHT_POINTS) % capture.grid.view_count, rng)
-    light = np.full(arriving.radiance.size, emission.mass / STRAIGHT_POINTS)
-    rows = _rows(arriving.surface[None], light, arriving.radiance)
+    _, points, radiance = emission.arriving(np.arange(STRAIGHT_POINTS) % capture.grid.view_count, rng)
+    light = np.full(radiance.size, emission.mass / STRAIGHT_POINTS)
     names = [_name(capture, number) for number in emission.numbers.tolist()]
-    return [
-        BrightLight.of(names[arriving.surface[row[0]]], light[row], arriving.radiance[row]) for row in rows
-    ]
+    rows = _rows(points.surface[None], radiance)
+    return [BrightLight.of(names[points.surface[row[0]]], light[row], radiance[row]) for row in rows]
 
 
 def mirrored_light(
@@ -123,14 +122,12 @@ def mirrored_light(
     tracer = LampTracer(render_scene, capture.rig, capture.cfa, disc_mm)
     known = set() if render_scene.why_rendered else {one.number for one in render_scene.shining}
     is_known = np.array([number in known for number in tracer.objects], dtype=bool)
-    if not (tracer.has_mirrors or (with_straight and not is_known.all())):
+    if not tracer.lamps or not (tracer.has_mirrors or (with_straight and not is_known.all())):
         return []
     least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
-    survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % max(len(tracer.lamps), 1)
-    is_bright = (
-        tracer.radiance_of(survey, seeds.integer(EXPLORATION_SEED, stage="lamp rays")) > least_radiance
-    )
-    lamps = np.unique(survey[is_bright]) if len(tracer.lamps) else survey[:0]
+    survey = np.arange(max(SURVEY_POINTS, len(tracer.lamps))) % len(tracer.lamps)
+    radiance = tracer.radiance_of(survey, seeds.integer(EXPLORATION_SEED, stage="lamp rays"))
+    lamps = np.unique(survey[radiance > least_radiance])
     if not lamps.size:
         return []
     is_searched = ~is_known & with_straight
@@ -140,8 +137,8 @@ def mirrored_light(
     if arrivals.light.sum() <= LEAST_SHARE * film_light:
         return []
     kinds = np.stack([arrivals.lamp, arrivals.is_scattered, arrivals.bounces * ~arrivals.is_scattered])
-    for row in _rows(kinds, arrivals.light, arrivals.radiance):
-        alike, (lamp, is_scattered, bounces) = arrivals.take(row), kinds[:, row[0]].tolist()
+    for row in _rows(kinds, arrivals.radiance):
+        alike, (lamp, is_scattered, bounces) = take_rows(arrivals, row), kinds[:, row[0]].tolist()
         name = _name(capture, tracer.objects[lamp])
         if alike.bounces.any():
             clear = capture.render_scene.names.get(int(np.bincount(alike.object_id).argmax()))
@@ -161,7 +158,7 @@ def _arrivals(
         number, round_number = max(rays, FIRST_RAYS), len(parts) + 1
         seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", round_number=round_number)
         arrivals, brightest = tracer.follow(np.resize(lamps, number), seed, least_radiance)
-        parts.append((number, arrivals.take((arrivals.bounces > 0) | is_searched[arrivals.lamp])))
+        parts.append((number, take_rows(arrivals, (arrivals.bounces > 0) | is_searched[arrivals.lamp])))
         rays += number
         light = np.concatenate([part.light * (of * lamps.size / rays) for of, part in parts])
         # Two standard errors, and three times the brightest ray for what none has met, are an upper limit
@@ -170,8 +167,7 @@ def _arrivals(
         does_not_matter = light.sum() + error < LEAST_SHARE * film_light
         if does_not_matter or error < KNOWN_TO * (film_light + light.sum()) or rays >= MAX_RAYS:
             break
-    columns = zip(*(part for _, part in parts), strict=True)
-    return Arrivals(*map(np.concatenate, columns))._replace(light=light)
+    return join_rows([part for _, part in parts])._replace(light=light)
 
 
 def lit_light(
@@ -183,12 +179,13 @@ def lit_light(
     tracer = LampTracer(capture.render_scene, capture.rig, capture.cfa, 0.0)
     least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
     rows, samples = list[BrightLight](), [nothing(capture.channels).exceeding]
-    for lit in tracer.lit_places(LIT_POINTS, seeds.integer(EXPLORATION_SEED, stage="lamp rays")):
-        view = np.arange(lit.area_mm2.size) % capture.grid.view_count
+    seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays")
+    for point_mm, normal, area_mm2 in tracer.lit_places(LIT_POINTS, seed):
+        view = np.arange(area_mm2.size) % capture.grid.view_count
         k, l = np.divmod(view, capture.grid.cols)
-        away_mm = lit.point_mm - capture.rig.position_mm[k, l]
+        away_mm = point_mm - capture.rig.position_mm[k, l]
         row, col, z_mm = capture.rig.film_px(view, away_mm)
-        image_px = lit.area_mm2 * capture.rig.image_px_per_mm2(lit.normal, away_mm, z_mm)
+        image_px = area_mm2 * capture.rig.image_px_per_mm2(normal, away_mm, z_mm)
         here = np.flatnonzero(is_on_film(capture.grid, row + 0.5, col + 0.5) & (image_px > 0))
         if not here.size:
             continue
@@ -202,11 +199,11 @@ def lit_light(
         if bright.any():
             light = (image_px[here] * radiance)[bright]
             rows.append(BrightLight.of("a place that a lamp lights", light, radiance[bright]))
-            samples.append(traced.take(bright))
-    return rows, Samples.joined(samples)
+            samples.append(take_rows(traced, bright))
+    return rows, join_rows(samples)
 
 
-def _rows(kinds: np.ndarray, light: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:
+def _rows(kinds: np.ndarray, radiance: np.ndarray) -> Iterator[np.ndarray]:
     """Indices of what is of the same kinds (K, N) and of one octave of radiance (N,)."""
     octave = np.floor(np.log2(np.maximum(radiance, np.finfo(float).tiny))).astype(np.int64)
     _, row = np.unique(np.concatenate([kinds, octave[None]]), axis=1, return_inverse=True)

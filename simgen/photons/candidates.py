@@ -16,6 +16,7 @@ import numpy as np
 from pcii.base import InputError
 from pcii.types import CameraGrid, channel_count, colour_cells
 from simgen.base import random_streams as seeds
+from simgen.base import take_rows
 from simgen.cameras import Cameras, Rig, as_rig, coarser, corners
 from simgen.photons.majorant import Majorant, Samples
 from simgen.renderer import RenderScene
@@ -35,8 +36,7 @@ class Capture:
     """A scene in the renderer, cameras, the Bayer pattern `cfa`, the light that is counted, and the seed.
 
     `photons_per_radiance` are the photons that a pixel catches of a unit of radiance, for an exposure; None
-    for a budget. `dark_map` is what pixels count without any, as of `detect`. Raises ValueError for an
-    exposure without `photons_per_radiance`, and for a budget with it.
+    for a budget. `dark_map` is what pixels count without any, as of `detect`.
     """
 
     render_scene: RenderScene
@@ -46,12 +46,6 @@ class Capture:
     photons_per_radiance: float | None = None
     seed: int = 0
     dark_map: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        if (self.photons_per_radiance is None) == (self.photons.scope == "exposure"):
-            raise ValueError(
-                "photons_per_radiance: needed for photons of scope 'exposure', and for no others"
-            )
 
     @cached_property
     def rig(self) -> Rig:
@@ -92,6 +86,11 @@ class Capture:
             return [np.arange(4)]
         cells = colour_cells(self.cfa).ravel()
         return [np.flatnonzero(cells == colour) for colour in range(self.channels)]
+
+    @cached_property
+    def is_cell_of_group(self) -> np.ndarray:
+        """Whether each of these groups has each Bayer cell, (G, 4) bool."""
+        return np.array([np.isin(np.arange(4), cells) for cells in self.cell_groups])
 
     @property
     def has_one_budget(self) -> bool:
@@ -191,10 +190,15 @@ def nothing(channels: int) -> Accepted:
     return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
 
 
-def is_of_group(cells: list[np.ndarray], group: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
-    """Which pixels (N,) are on a Bayer cell (2 a + b) of their `group` (N,), whose cells are `cells`."""
-    is_cell_of_group = np.array([np.isin(np.arange(4), of_group) for of_group in cells])
-    return is_cell_of_group[group, row % 2 * 2 + col % 2]
+def pixels_of(points: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column (N,), int64, of the pixels that points of films lie in."""
+    return points.row.astype(np.int64), points.col.astype(np.int64)
+
+
+def cells_of(points: Any) -> np.ndarray:
+    """Bayer cell 2 a + b (N,) of each of these pixels."""
+    row, col = pixels_of(points)
+    return row % 2 * 2 + col % 2
 
 
 class FilmPoints(NamedTuple):
@@ -206,8 +210,7 @@ class FilmPoints(NamedTuple):
 
     def on_film(self, grid: CameraGrid) -> "FilmPoints":
         """Those that lie on the film; NaN lies nowhere."""
-        which = is_on_film(grid, self.row, self.col)
-        return FilmPoints(self.view[which], self.row[which], self.col[which])
+        return take_rows(self, is_on_film(grid, self.row, self.col))
 
     @classmethod
     def evenly(cls, grid: CameraGrid, number: int, seed: int) -> "FilmPoints":
@@ -278,7 +281,8 @@ class CandidateSampler(ABC):
         majorant = self.majorant
         bound = majorant.bound * (majorant.side_px**2 / 4)[:, None]
         if self.below is not None:
-            bound *= majorant.is_above(self.below)[:, None]
+            both = zip(majorant.bounds, self.below.bounds, strict=True)
+            bound *= np.any([above > below for above, below in both], axis=(0, 2))[:, None]
         self.colours = colour_cells(self.capture.cfa).ravel()
         self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in self.capture.cell_groups]
         self.mass = np.array([sums[-1] for sums in self.running])

@@ -95,14 +95,10 @@ def probe(capture: Capture, seed: int, known_rows: Sequence[BrightLight] = ()) -
     sum over the pixels, and n L^2 to the variance.
     """
     small, pixels = replace(capture.coarse_grid, rows=1, cols=1), capture.pixels
-
-    def mosaic(part: int) -> np.ndarray:
-        view_seed = seeds.integer(seed, stage="plan probe", part=part)
-        samples = {"samples_per_pixel": PROBE_SAMPLES, "independent": True}
-        view = render_view(capture.render_scene, small, 0, 0, seed=view_seed, **samples)
-        return sense(view, capture.cfa).astype(np.float64)
-
-    first, second = mosaic(0), mosaic(1)
+    samples = {"samples_per_pixel": PROBE_SAMPLES, "independent": True}
+    halves = [seeds.integer(seed, stage="plan probe", part=part) for part in (0, 1)]
+    views = (render_view(capture.render_scene, small, 0, 0, seed=half, **samples) for half in halves)
+    first, second = (sense(view, capture.cfa).astype(np.float64) for view in views)
     # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
     variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
     mean = float((first + second).mean() / 2)
@@ -110,15 +106,11 @@ def probe(capture: Capture, seed: int, known_rows: Sequence[BrightLight] = ()) -
     known = straight_light(capture) + lit_light(sampler_of_films(capture), film_light, paths)[0]
     known += mirrored_light(capture, film_light, paths, with_straight=True)
     bright = max(known, list(known_rows), key=_noise)
-    missed = _missed(bright, paths, pixels)
+    # The part of each that this many paths have not met, on average.
+    missed = [row._replace(light=row.light * math.exp(-row.hits(paths, pixels))) for row in bright]
     # Of light in a single pixel two halves tell the variance badly, even if both have met it.
     variance = max(float(variance) + _noise(missed) / pixels, _noise(bright) / pixels)
     return Probe(mean + sum(row.light for row in missed) / pixels, variance, tuple(bright))
-
-
-def _missed(rows: Sequence[BrightLight], paths: float, pixels: int) -> list[BrightLight]:
-    """The part of each row that this many paths have not met, on average."""
-    return [row._replace(light=row.light * math.exp(-row.hits(paths, pixels))) for row in rows]
 
 
 def _noise(rows: Sequence[BrightLight]) -> float:

@@ -26,8 +26,10 @@ import numpy as np
 
 from pcii.base import LUMINANCE
 from pcii.types import colour_cells
+from simgen.assets import across_faces
+from simgen.base import join_rows, take_rows
 from simgen.cameras import Rig, as_rig, corners
-from simgen.photons.candidates import Capture, is_of_group, is_on_film
+from simgen.photons.candidates import Capture, cells_of, is_on_film, pixels_of
 from simgen.renderer import ShiningSurface
 from simgen.sensor import PhotonTable
 
@@ -64,17 +66,13 @@ class Pieces(NamedTuple):
     @property
     def area_mm2(self) -> np.ndarray:
         """Area of each, (P,)."""
-        return np.linalg.norm(_across(self.corners_mm), axis=1) / 2
+        return np.linalg.norm(across_faces(self.corners_mm), axis=1) / 2
 
     @property
     def normal(self) -> np.ndarray:
         """Unit normals (P, 3) of the triangles."""
-        across = _across(self.corners_mm)
+        across = across_faces(self.corners_mm)
         return across / np.linalg.norm(across, axis=1, keepdims=True)
-
-    def take(self, which: np.ndarray) -> "Pieces":
-        """Some of them, by mask or index."""
-        return Pieces(*(column[which] for column in self))
 
 
 def pieces_in_view(surfaces: Sequence[ShiningSurface], rig: Rig) -> Pieces:
@@ -85,8 +83,8 @@ def pieces_in_view(surfaces: Sequence[ShiningSurface], rig: Rig) -> Pieces:
         halved = is_loose & (sent > FINE_SHARE * sent.sum())
         if not halved.any() or sent.size + halved.sum() > MOST_PIECES:
             return pieces
-        halves, are_loose = _bounded(_halves(pieces.take(halved)), surfaces, rig)
-        pieces = _joined([pieces.take(~halved), halves])
+        halves, are_loose = _bounded(_halves(take_rows(pieces, halved)), surfaces, rig)
+        pieces = join_rows([take_rows(pieces, ~halved), halves])
         is_loose = np.concatenate([is_loose[~halved], are_loose])
 
 
@@ -95,7 +93,7 @@ def _whole(surfaces: Sequence[ShiningSurface]) -> Pieces:
     parts = []
     for number, one in enumerate(surfaces):
         corners_mm = one.corners_mm.astype(np.float64)
-        twice_mm2 = np.linalg.norm(_across(corners_mm), axis=1)
+        twice_mm2 = np.linalg.norm(across_faces(corners_mm), axis=1)
         has_area = twice_mm2 > SLIVER * _sides_mm(corners_mm).max(axis=1) ** 2
         count, texcoords = int(has_area.sum()), one.texcoords
         texcoords = np.zeros((count, 3, 2)) if texcoords is None else texcoords[has_area]
@@ -105,7 +103,7 @@ def _whole(surfaces: Sequence[ShiningSurface]) -> Pieces:
             height_mm = ((part.corners_mm[:, 0] - one.ball[0]) * part.normal).sum(axis=1)
             part = part._replace(height_mm=height_mm)
         parts.append(part)
-    return _joined(parts)
+    return join_rows(parts)
 
 
 def _bounded(pieces: Pieces, surfaces: Sequence[ShiningSurface], rig: Rig) -> tuple[Pieces, np.ndarray]:
@@ -160,7 +158,7 @@ def _bounded(pieces: Pieces, surfaces: Sequence[ShiningSurface], rig: Rig) -> tu
     is_loose |= ((low_px < -0.5) | (high_px > size_px - 0.5)).any(axis=1)
     brightest, is_uneven = _brightest(pieces, surfaces)
     bound = ROUNDING * scale_px**2 * sent * stretch * brightest
-    return pieces._replace(bound=bound).take(bound > 0), (is_loose | is_uneven)[bound > 0]
+    return take_rows(pieces._replace(bound=bound), bound > 0), (is_loose | is_uneven)[bound > 0]
 
 
 def _brightest(pieces: Pieces, surfaces: Sequence[ShiningSurface]) -> tuple[np.ndarray, np.ndarray]:
@@ -202,12 +200,8 @@ def _halves(pieces: Pieces) -> Pieces:
         first[:, 1] = second[:, 0] = first[:, :2].mean(axis=1)
         return np.concatenate([first, second])
 
-    halves = pieces.take(np.tile(number, 2))
+    halves = take_rows(pieces, np.tile(number, 2))
     return halves._replace(corners_mm=cut(pieces.corners_mm), texcoords=cut(pieces.texcoords))
-
-
-def _joined(parts: Sequence[Pieces]) -> Pieces:
-    return Pieces(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _sides_mm(corners_mm: np.ndarray) -> np.ndarray:
@@ -215,47 +209,22 @@ def _sides_mm(corners_mm: np.ndarray) -> np.ndarray:
     return np.linalg.norm(corners_mm - np.roll(corners_mm, -1, axis=1), axis=2)
 
 
-def _across(corners_mm: np.ndarray) -> np.ndarray:
-    return np.cross(corners_mm[:, 1] - corners_mm[:, 0], corners_mm[:, 2] - corners_mm[:, 0])
-
-
 class ShiningPoints(NamedTuple):
     """Points (N,) that shine, the lens points that they are seen from, and where they fall on the film.
 
-    `sent` times the radiance is what is sent per mm^2, in radiance px, and at most `bound`; 0 if the point
-    faces away or lies behind the camera, where rows and columns are NaN.
+    `row` and `col` are counted from the film's corner. `sent` times the radiance is what is sent per mm^2, in
+    radiance px, and at most `bound`; 0 if the point faces away or lies behind the camera, where rows and
+    columns are NaN.
     """
 
     surface: np.ndarray
     point_mm: np.ndarray
     camera_mm: np.ndarray
     texcoord: np.ndarray
-    row_px: np.ndarray
-    col_px: np.ndarray
-    sent: np.ndarray
-    bound: np.ndarray
-
-    def take(self, which: np.ndarray) -> "ShiningPoints":
-        """Some of them, by mask or index."""
-        return ShiningPoints(*(column[which] for column in self))
-
-
-class Arriving(NamedTuple):
-    """Light (N,) that arrives on films: of which candidate, in which pixel, from which surface.
-
-    `radiance` is in the pixel's own colour, `z_mm` the planar depth of the point that shines.
-    """
-
-    candidate: np.ndarray
     row: np.ndarray
     col: np.ndarray
-    surface: np.ndarray
-    radiance: np.ndarray
-    z_mm: np.ndarray
-
-    def take(self, which: np.ndarray) -> "Arriving":
-        """Some of it, by mask or index."""
-        return Arriving(*(column[which] for column in self))
+    sent: np.ndarray
+    bound: np.ndarray
 
 
 class EmissionSampler:
@@ -274,34 +243,38 @@ class EmissionSampler:
             self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
             self.mass = float(self.running[-1]) if self.running.size else 0.0
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
-        """Photons of a candidate for each of `group` (N,) on the film of `view` (N,), and whose each is.
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
+        """Photons of a candidate on each film of `view` (N,), and whose each is.
 
-        `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
+        What falls on other Bayer cells than its `cells` (N, 4) bool is rejected.
         """
-        light = self.arriving(view, np.random.default_rng(seed))
-        light = light.take(is_of_group(cells, group[light.candidate], light.row, light.col))
-        k, l = np.divmod(view[light.candidate], self.capture.grid.cols)
-        origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
-        return PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin), light.candidate
+        candidate, points, _ = self.arriving(view, np.random.default_rng(seed))
+        here = cells[candidate, cells_of(points)]
+        candidate, points = candidate[here], take_rows(points, here)
+        k, l = np.divmod(view[candidate], self.capture.grid.cols)
+        origin = {"object_id": self.numbers[points.surface], "z_mm": points.point_mm[:, 2]}
+        return PhotonTable(k, l, *pixels_of(points), np.ones_like(k), **origin), candidate
 
-    def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
-        """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
+    def arriving(
+        self, view: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, ShiningPoints, np.ndarray]:
+        """Those of candidates on the films of `view` (N,) that are kept and that nothing hides.
+
+        Their numbers, their points, and the radiance of each in its pixel's own colour.
+        """
         points, chance = self.film_points(view, rng), rng.random(view.size)
-        row, col = np.floor(points.row_px + 0.5), np.floor(points.col_px + 0.5)
-        which = np.flatnonzero(is_on_film(self.capture.grid, row, col) & (points.sent > 0))
-        points, row, col = points.take(which), row[which].astype(np.int64), col[which].astype(np.int64)
-        colour = colour_cells(self.capture.cfa).ravel()[row % 2 * 2 + col % 2]
+        which = np.flatnonzero(is_on_film(self.capture.grid, points.row, points.col) & (points.sent > 0))
+        points = take_rows(points, which)
+        colour = colour_cells(self.capture.cfa).ravel()[cells_of(points)]
         radiance = self._radiance(points)[np.arange(which.size), colour]
         is_kept = chance[which] * points.bound < points.sent * radiance
-        light = Arriving(which, row, col, points.surface, radiance, points.point_mm[:, 2]).take(is_kept)
-        points = points.take(is_kept)
-        blocker = self.capture.render_scene.standing_before(points.camera_mm, points.point_mm, SHADOW_EPSILON)
+        which, points, radiance = which[is_kept], take_rows(points, is_kept), radiance[is_kept]
+        away_mm = points.point_mm - points.camera_mm
+        blocker = self.capture.render_scene.objects_hit(points.camera_mm, away_mm, 1 - SHADOW_EPSILON)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
-        is_itself = self.is_ball[light.surface] & (blocker == self.numbers[light.surface])
-        return light.take((blocker < 0) | is_itself)
+        is_itself = self.is_ball[points.surface] & (blocker == self.numbers[points.surface])
+        is_seen = (blocker < 0) | is_itself
+        return which[is_seen], take_rows(points, is_seen), radiance[is_seen]
 
     def film_points(self, view: np.ndarray, rng: np.random.Generator) -> ShiningPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""
@@ -335,7 +308,7 @@ class EmissionSampler:
         away_mm = point_mm - camera_mm
         row_px, col_px, z_mm = rig.film_px(view, away_mm, lens_point)
         sent = stretch * rig.image_px_per_mm2(normal, away_mm, z_mm)
-        points = surface, point_mm, camera_mm, texcoord, row_px, col_px
+        points = surface, point_mm, camera_mm, texcoord, row_px + 0.5, col_px + 0.5
         return ShiningPoints(*points, sent, self.pieces.bound[piece])
 
     def _radiance(self, points: ShiningPoints) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from simgen.base import join_rows, take_rows
 from simgen.base import random_streams as seeds
 from simgen.photons.bright_light import LEAST_SHARE, SURE_HITS, BrightLight, lit_light, mirrored_light
 from simgen.photons.candidates import (
@@ -22,6 +23,7 @@ from simgen.photons.candidates import (
     Capture,
     FilmPoints,
     ImageCells,
+    cells_of,
 )
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.majorant import (
@@ -194,10 +196,10 @@ def _send_pilot(capture: Capture, plan: Plan) -> tuple[Plan, np.ndarray]:
             samples.append(sampler.trace(aimed, aimed.view.size, path_seed))
         contrast = float(surroundings.max() / mean.max())
         if contrast >= MIN_CONTRAST and not capture.render_scene.hides_surroundings:
-            openings, traced = _look_for_openings(sampler, Samples.joined(samples).z_mm, contrast)
+            openings, traced = _look_for_openings(sampler, join_rows(samples).z_mm, contrast)
             samples.append(openings)
             paths += traced
-        joined = Samples.joined(samples)
+        joined = join_rows(samples)
         layers = layers_for(grid, tile_px_for(grid, rays), joined.z_mm)
         paths += sampler.count_paths(rays + aimed.view.size, followed + aimed.view.size)
         majorant = fit(grid, layers, joined, dim)
@@ -251,7 +253,7 @@ def _send_first_pilot(sampler: CandidateSampler) -> tuple[Samples, int]:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
         points = FilmPoints.evenly(sampler.capture.grid, rays, path_seed)
         samples = sampler.trace(points, rays, path_seed)
-        samples = samples.take(samples.followed)
+        samples = take_rows(samples, samples.followed)
         paths += sampler.count_paths(rays, rays)
         if samples.light.any() or rays >= sampler.max_dark_candidates:
             return samples, paths
@@ -264,12 +266,12 @@ def _aimed_points(capture: Capture, emission: EmissionSampler) -> FilmPoints:
     view = np.arange(AIMED_RAYS) % capture.grid.view_count
     if emission.mass:
         points = emission.film_points(view, rng)
-        places_px.append(np.stack([points.row_px, points.col_px]))
+        places_px.append(np.stack([points.row, points.col]))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=1)
     direction = bright_directions(capture.render_scene, AIMED_RAYS, path_seed)
     if len(direction):
-        places_px.append(np.stack(capture.rig.film_px(view, direction)[:2]))
-    row, col = np.concatenate(places_px, axis=1) + 0.5
+        places_px.append(np.stack(capture.rig.film_px(view, direction)[:2]) + 0.5)
+    row, col = np.concatenate(places_px, axis=1)
     return FilmPoints(np.resize(view, row.size), row, col).on_film(capture.grid)
 
 
@@ -288,7 +290,7 @@ def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: fl
         return openings, rays
     rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=4)
     cells = np.unique(np.stack([openings.row, openings.col]) // 2, axis=1, return_index=True)[1]
-    sources = openings.take(rng.permutation(cells)[:MAX_OPENINGS])
+    sources = take_rows(openings, rng.permutation(cells)[:MAX_OPENINGS])
     guesses = int(np.clip(GUESSES // (sources.k.size * grid.view_count), *GUESSES_PER_VIEW))
     each = guesses * grid.view_count
     k, l, row, col = (part.repeat(each) for part in (sources.k, sources.l, sources.row, sources.col))
@@ -299,13 +301,13 @@ def _look_for_openings(sampler: CandidateSampler, z_mm: np.ndarray, contrast: fl
     col = col + 0.5 + right - (view % grid.cols - l) * (grid.pitch_mm[0] * per_mm - grid.shear_px[0])
     points = FilmPoints(view, row, col).on_film(grid)
     again = _trace_misses(sampler, points, path_seed)
-    return Samples.joined([openings, again]), rays + points.view.size
+    return join_rows([openings, again]), rays + points.view.size
 
 
 def _trace_misses(sampler: CandidateSampler, points: FilmPoints, seed: int) -> Samples:
     """Rays that hit nothing: what they see needs no light path, the guess is right."""
     samples = sampler.trace(points, 1, seed)
-    samples = samples.take(np.isinf(samples.z_mm))
+    samples = take_rows(samples, np.isinf(samples.z_mm))
     return samples._replace(light=samples.guess)
 
 
@@ -330,8 +332,7 @@ def _kept_share(capture: Capture, known: EmissionSampler | MirrorImages | KnownP
         return 0.0
     view = np.arange(AIMED_RAYS) % capture.grid.view_count
     path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-    photons, _ = known.draw(np.zeros_like(view), view, [np.arange(4)], path_seed)
-    return photons.k.size / AIMED_RAYS
+    return known.draw(np.ones((AIMED_RAYS, 4), bool), view, path_seed)[0].k.size / AIMED_RAYS
 
 
 def _warm_up(
@@ -385,7 +386,6 @@ def _above_bounds(accepted: Accepted, mass_per_candidate: float, colours: np.nda
     exceeding = accepted.exceeding
     if not exceeding.k.size:
         return []
-    colour = colours[exceeding.row % 2 * 2 + exceeding.col % 2]
-    radiance = exceeding.light[np.arange(colour.size), colour]
+    radiance = exceeding.light[np.arange(exceeding.k.size), colours[cells_of(exceeding)]]
     ratio = accepted.ratio[accepted.ratio > 1].astype(np.float64)
     return [BrightLight.of(RARE, ratio * mass_per_candidate, radiance)]

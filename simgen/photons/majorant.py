@@ -16,14 +16,13 @@ before any light is looked for. Nothing is ever taken to be darker than a coarse
 may be left out for having looked black.
 """
 
-from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pcii.types import CameraGrid
+from simgen.base import take_rows
 
 TILES_ACROSS = 256
 """Largest number of tiles along the longer side of a film, about, whatever its pixels."""
@@ -74,15 +73,6 @@ class Samples(NamedTuple):
         """Which paths were, (N,) bool."""
         return np.isfinite(self.light[:, 0])
 
-    def take(self, which: np.ndarray) -> "Samples":
-        """Some of them, by mask or index."""
-        return Samples(*(column[which] for column in self))
-
-    @staticmethod
-    def joined(parts: "Sequence[Samples]") -> "Samples":
-        """Those of all parts, one part after the other."""
-        return Samples(*map(np.concatenate, zip(*parts, strict=True)))
-
 
 @dataclass(frozen=True)
 class DisparityLayers:
@@ -127,8 +117,7 @@ class DisparityLayers:
 
     def layer_row_col(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Layer, row and column of flat indices."""
-        rest, col = np.divmod(tiles, self.cols)
-        layer, row = np.divmod(rest, self.rows)
+        layer, row, col = np.unravel_index(tiles, (len(self.row_shift), self.rows, self.cols))
         return layer, row, col
 
     def around(self, tiles: np.ndarray, reach: int = 1) -> np.ndarray:
@@ -207,9 +196,10 @@ class Majorant:
         self.radiance_ratio_bound = np.full(self.bound.shape, ENDLESS)
         self.entry_of = np.full(layers.tiles, -1, dtype=np.int32)
 
-    def copy(self) -> "Majorant":
-        """Another of the same bounds, which are raised apart from these."""
-        return deepcopy(self)
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both bounds of every entry."""
+        return self.bound, self.radiance_ratio_bound
 
     @property
     def side_px(self) -> np.ndarray:
@@ -264,7 +254,7 @@ class Majorant:
         faint = (owner < self.coarse_count) & (exceeding.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
             _raise_rows(self.bound, owner[faint], RAISE_FACTOR * exceeding.light[faint])
-            exceeding = exceeding.take(~faint)
+            exceeding = take_rows(exceeding, ~faint)
         if not exceeding.k.size:
             return
         around = self.layers.around(self.layers.tiles_of(exceeding), reach)
@@ -284,23 +274,18 @@ class Majorant:
         if coarse.any():
             row, col = self.row[owner[coarse]], self.col[owner[coarse]]
             rows, cols = _squares_around(row, col, reach - 1, self.coarse_rows, self.coarse_cols)
-            self._raise_entries(rows * self.coarse_cols + cols, exceeding.take(coarse))
+            self._raise_entries(rows * self.coarse_cols + cols, take_rows(exceeding, coarse))
         if not coarse.all():
             entry = owner[~coarse]
             tiles = layers.flat(self.layer[entry], self.row[entry], self.col[entry])
             near = self.entry_of[layers.around(tiles, reach)]
-            self._raise_entries(np.where(near < 0, entry[:, None], near), exceeding.take(~coarse))
+            self._raise_entries(np.where(near < 0, entry[:, None], near), take_rows(exceeding, ~coarse))
 
     def _raise_entries(self, entries: np.ndarray, exceeding: Samples) -> None:
         """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
         light, ratio = exceeding.light, exceeding.light / exceeding.guess
-        for levels, needed in ((self.bound, light), (self.radiance_ratio_bound, ratio)):
+        for levels, needed in zip(self.bounds, (light, ratio), strict=True):
             _raise_rows(levels, entries.ravel(), RAISE_FACTOR * needed.repeat(entries.shape[1], axis=0))
-
-    def is_above(self, below: "Majorant") -> np.ndarray:
-        """Which entries have been raised since `below` was copied, (E,) bool."""
-        raised = (self.bound > below.bound) | (self.radiance_ratio_bound > below.radiance_ratio_bound)
-        return np.asarray(raised.any(axis=1))
 
 
 def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.ndarray) -> Majorant:
@@ -311,7 +296,7 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
     are listed too, with the largest guess around them: a surface goes on between the places where rays
     happened to hit it.
     """
-    samples = samples.take(np.any(np.fmax(samples.light, samples.guess) > dim, axis=1))
+    samples = take_rows(samples, np.any(np.fmax(samples.light, samples.guess) > dim, axis=1))
     tiles, followed = layers.tiles_of(samples), samples.followed
     light = samples.light[followed]
     near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from simgen.base import join_rows, take_rows
 from simgen.base import random_streams as seeds
-from simgen.cameras import Rig
 from simgen.photons.bright_light import BrightLight
-from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, is_of_group
+from simgen.photons.candidates import EXPLORATION_SEED, Capture, FilmPoints, ImageCells, cells_of, pixels_of
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.sensor import PhotonTable, joined, no_photons
@@ -58,21 +58,18 @@ class MirrorImages:
         self.of_view = self.running[np.searchsorted(cells.number, first)]
         self.mass = float(np.diff(self.of_view).max())
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
         """Photons as of `EmissionSampler.draw`."""
         rng = np.random.default_rng(seed)
         points, candidate, cell = self._draw(view, rng)
-        here = is_of_group(cells, group[candidate], points.row.astype(np.int64), points.col.astype(np.int64))
-        points, candidate, cell = FilmPoints(*(part[here] for part in points)), candidate[here], cell[here]
+        here = cells[candidate, cells_of(points)]
+        points, candidate, cell = take_rows(points, here), candidate[here], cell[here]
         radiance, _, object_id, z_mm = self.sampler.trace_mirrored(points, self.cells.above, seed)
         # Of what exceeds its bound there are more photons than one.
         number = np.floor(radiance / self.bound[cell] + rng.random(cell.size)).astype(np.int64)
         k, l = np.divmod(points.view, self.grid.cols)
-        i, j = points.row.astype(np.int64), points.col.astype(np.int64)
         origin = {"object_id": object_id, "z_mm": z_mm}
-        photons = PhotonTable(k, l, i, j, np.ones_like(k), **origin).take(np.arange(k.size).repeat(number))
+        photons = PhotonTable(k, l, *pixels_of(points), number, **origin).one_by_one()
         return photons, candidate.repeat(number)
 
     def light_by_bounces(self, number: int, seed: int) -> np.ndarray:
@@ -111,9 +108,7 @@ class KnownPlaces:
         """Cells in which images of lamps are drawn, which paths through the film leave out."""
         return next((part.cells for part in self.parts if isinstance(part, MirrorImages)), None)
 
-    def draw(
-        self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
-    ) -> tuple[PhotonTable, np.ndarray]:
+    def draw(self, cells: np.ndarray, view: np.ndarray, seed: int) -> tuple[PhotonTable, np.ndarray]:
         """Photons as of `EmissionSampler.draw`."""
         which = np.zeros(view.size, dtype=np.int64)
         if len(self.parts) > 1:
@@ -122,7 +117,7 @@ class KnownPlaces:
         tables, candidates = [no_photons()], [np.zeros(0, dtype=np.int64)]
         for number, part in enumerate(self.parts):
             here = np.flatnonzero(which == number)
-            photons, candidate = part.draw(group[here], view[here], cells, seed)
+            photons, candidate = part.draw(cells[here], view[here], seed)
             tables.append(photons)
             candidates.append(here[candidate])
         return joined(tables), np.concatenate(candidates)
@@ -134,38 +129,38 @@ def find_images(sampler: WavefrontSampler, lights: Sequence[BrightLight]) -> Mir
     grid, above = sampler.capture.grid, LEAST_PEAK * float(min(peaks))
     met, radiance = [FilmPoints(*np.zeros((3, 0)))], [np.zeros(0)]
 
-    def send(points: FilmPoints, part: int) -> tuple[FilmPoints, np.ndarray]:
-        seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
-        if not points.view.size:
-            return points, np.zeros(0)
-        brought, *_ = sampler.trace_mirrored(points, above, seed)
-        return FilmPoints(*(column[brought > 0] for column in points)), brought[brought > 0]
+    def send(points: FilmPoints, part: int) -> FilmPoints:
+        if points.view.size:
+            seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays", part=part)
+            brought, *_ = sampler.trace_mirrored(points, above, seed)
+            points = take_rows(points, brought > 0)
+            met.append(points)
+            radiance.append(brought[brought > 0])
+        return points
 
     for number, light in enumerate(lights):
         rng = seeds.generator(EXPLORATION_SEED, stage="lamp rays", part=number)
-        first, brought = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
+        first = send(_first_points(sampler.capture, light, rng), 10 + 2 * number)
         if first.view.size:
             around = _evenly_by_pixel(first, MORE_PATHS, rng)
             aside_px = rng.standard_normal((2, MORE_PATHS)) * np.sqrt(light.image_px)
             row, col = first.row[around] + aside_px[0], first.col[around] + aside_px[1]
-            second, more = send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
-            met += [first, second]
-            radiance += [brought, more]
-    points, brought = FilmPoints(*map(np.concatenate, zip(*met, strict=True))), np.concatenate(radiance)
+            send(FilmPoints(first.view[around], row, col).on_film(grid), 11 + 2 * number)
+    points, brought = join_rows(met), np.concatenate(radiance)
     if not brought.size:
         return None
     finest = CELLS_ACROSS / np.sqrt(min(light.image_px for light in lights))
     per_px = int(np.clip(2 ** np.ceil(np.log2(finest)), 1, MAX_CELLS_PER_PX))
-    cells, bound = _cells_around(sampler.capture, points, brought, per_px)
-    while cells.size > MAX_CELLS:
-        per_px //= 2
+    while True:
         cells, bound = _cells_around(sampler.capture, points, brought, per_px)
-    return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
+        if cells.size <= MAX_CELLS:
+            return MirrorImages(sampler, ImageCells(per_px, cells, above), RAISED * bound)
+        per_px //= 2
 
 
 def _evenly_by_pixel(points: FilmPoints, number: int, rng: np.random.Generator) -> np.ndarray:
     """Indices (`number`,) of points, half of them drawn evenly and half so that each pixel has as many."""
-    pixel = np.stack([points.view, points.row.astype(np.int64), points.col.astype(np.int64)])
+    pixel = np.stack([points.view, *pixels_of(points)])
     _, which, times = np.unique(pixel, axis=1, return_inverse=True, return_counts=True)
     chance = 1 / times[which.ravel()]
     half = rng.choice(chance.size, number // 2, p=chance / chance.sum())
@@ -198,7 +193,10 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
         off_px = np.linalg.norm(seen_px - design @ fitted, axis=2, keepdims=True)
         usual_px = np.maximum(np.median(off_px, axis=1, keepdims=True), MIN_SPREAD_PX)
         weight = 1 / np.sqrt(1 + (off_px / usual_px) ** 2)
-    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px) + _blur_px(capture.rig, fitted)
+    spread_px = usual_px[:, 0, 0] + np.sqrt(light.image_px)
+    if (lens := capture.rig.lens) is not None:  # whose images are blurred as they move over it
+        moves_px = fitted[:, 1:] + np.eye(2)[::-1] * (grid.focal_mm / grid.pixel_mm) / lens.focus_mm
+        spread_px += lens.aperture_mm / 2 * np.abs(moves_px).sum(axis=1).max(axis=1)
     paths = (FIRST_HITS * 2 * np.pi * spread_px**2 / light.image_px).sum()
     moved_px = (seen_px - aside_mm @ fitted[:, 1:]).reshape(-1, 2) + 0.5
     points = FilmPoints(views.repeat(number), *moved_px.T).on_film(grid)
@@ -210,15 +208,6 @@ def _first_points(capture: Capture, light: BrightLight, rng: np.random.Generator
     return FilmPoints(points.view[which], row, col).on_film(grid)
 
 
-def _blur_px(rig: Rig, fitted: np.ndarray) -> np.ndarray:
-    """Radius (V,) of the blur of an image that moves by `fitted` (V, 3, 2) px per mm; 0 of pinholes."""
-    if rig.lens is None:
-        return np.zeros(len(fitted))
-    scale_px = rig.grid.focal_mm / rig.grid.pixel_mm
-    per_mm = np.abs(fitted[:, 1:] + np.eye(2)[::-1] * scale_px / rig.lens.focus_mm).sum(axis=1).max(axis=1)
-    return rig.lens.aperture_mm / 2 * per_mm
-
-
 def _cells_around(
     capture: Capture, points: FilmPoints, radiance: np.ndarray, per_px: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -226,14 +215,11 @@ def _cells_around(
     largest radiance (M,) of points in each and beside it."""
     height, width = capture.grid.height * per_px, capture.grid.width * per_px
     row, col = ((part * per_px).astype(np.int64) for part in (points.row, points.col))
-    numbers, values = list[np.ndarray](), list[np.ndarray]()
-    for down, right in np.ndindex(3, 3):
-        i, j = row + down - 1, col + right - 1
-        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
-        number = (points.view.astype(np.int64) * height + i) * width + j
-        numbers.append(number[inside])
-        values.append(radiance[inside])
-    cells, index = np.unique(np.concatenate(numbers), return_inverse=True)
+    down, right = np.indices((3, 3)).reshape(2, -1, 1) - 1
+    i, j = row + down, col + right
+    inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+    number = (points.view.astype(np.int64) * height + i) * width + j
+    cells, index = np.unique(number[inside], return_inverse=True)
     largest = np.zeros(cells.size)
-    np.maximum.at(largest, index, np.concatenate(values))
+    np.maximum.at(largest, index, np.broadcast_to(radiance, inside.shape)[inside])
     return cells.astype(np.uint64), largest

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from pcii.base import LUMINANCE
-from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film
+from simgen.base import take_rows
+from simgen.photons.candidates import (
+    Accepted,
+    Candidates,
+    CandidateSampler,
+    FilmPoints,
+    cells_of,
+    is_on_film,
+    pixels_of,
+)
 from simgen.photons.majorant import Samples
 from simgen.renderer import rows_of
 from simgen.sensor import PhotonTable
@@ -55,19 +64,17 @@ class ScalarSampler(CandidateSampler):
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         rng = np.random.default_rng(seed)
-        view, i, j = (part[:follow] for part in points)
-        k, l = np.divmod(view, self.capture.grid.cols)
-        row, col, entry = i.astype(np.int64), j.astype(np.int64), np.zeros_like(k)
-        colour = self.colours[row % 2 * 2 + col % 2]
-        inside, lens_point = np.ones(view.size, dtype=bool), self._lens_points(rng, view.size)
-        candidates = Candidates(k, l, row, col, i - 0.5, j - 0.5, entry, colour, inside, lens_point)
-        if self.capture.render_scene.filters is None:
-            light = self._follow(candidates, rng)
-        else:  # once in each colour
-            turns = [
-                candidates._replace(colour=np.full_like(colour, c)) for c in range(self.capture.channels)
-            ]
-            light = np.sum([self._follow(one, rng) for one in turns], axis=0)
+        points = take_rows(points, slice(follow))
+        k, l = np.divmod(points.view, self.capture.grid.cols)
+        places = *pixels_of(points), points.row - 0.5, points.col - 0.5
+        colour, inside = self.colours[cells_of(points)], np.ones(k.size, dtype=bool)
+        lens_point = self._lens_points(rng, k.size)
+        candidates = Candidates(k, l, *places, np.zeros_like(k), colour, inside, lens_point)
+        colours = [colour]
+        if self.capture.render_scene.filters is not None:  # once in each colour
+            colours = [np.full_like(colour, number) for number in range(self.capture.channels)]
+        turns = (candidates._replace(colour=one) for one in colours)
+        light = np.sum([self._follow(turn, rng) for turn in turns], axis=0)
         object_id, z_mm = self._first_hits(candidates)
         self.require_finite(light.sum(axis=1), candidates, object_id)
         return self._samples(candidates, z_mm, light)

@@ -17,6 +17,7 @@ photons come of one path. docs/theory.md has the proof.
 
 import math
 from collections import Counter
+from copy import deepcopy
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -24,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, Report, silent
+from simgen.base import join_rows
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Capture, ranks_in_scopes
 from simgen.photons.exploration import MIN_KEPT_SHARE, Plan, explore, sampler_class
@@ -105,7 +107,7 @@ class _Drawing:
         self.known_places, self.kept_share = plan.known_places or KnownPlaces([]), plan.kept_share
         self.totals = capture.draw_totals()
         self.number = np.zeros(self.totals.size, dtype=np.int64)
-        self.majorant = None if plan.majorant is None else plan.majorant.copy()
+        self.majorant = None if plan.majorant is None else deepcopy(plan.majorant)
         self.tally = Counter(paths=plan.paths)
 
     def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
@@ -117,10 +119,8 @@ class _Drawing:
             else:
                 self._expose(photons, gain)
             self._draw_above(photons)
-        table = photons.first_of_each()
-        assert table.scope is not None
-        self.number += np.bincount(table.scope, minlength=wanted.size)
-        return table
+        self.number += np.minimum(photons.number, wanted)
+        return photons.first_of_each()
 
     def draw_counts(self) -> PhotonTable:
         """A row for each pixel that caught photons, drawn in parts that memory holds.
@@ -204,9 +204,9 @@ class _Drawing:
             if not parts:
                 return
             assert self.majorant is not None
-            exceeding = Samples.joined(parts)
+            exceeding = join_rows(parts)
             self.tally.update(raises=1, exceeding=exceeding.k.size)
-            below, before = self.majorant.copy(), max(self.tally["candidates"], WAVEFRONT)
+            below, before = deepcopy(self.majorant), max(self.tally["candidates"], WAVEFRONT)
             self.majorant.raise_bounds(exceeding, reach=raises)
             sampler = self.plan.sampler(self.capture, self.majorant, below)
             expected = photons.time * sampler.mass[self.capture.group_of_scope]
@@ -240,9 +240,9 @@ class _Drawing:
         emits: bool = False,
     ) -> None:
         """Candidates of some scopes, from time `begin` on: of films, and with `emits` of what shines."""
-        numbers = {"seed": self.capture.seed, "round_number": self.tally["rounds"]}
-        rng = seeds.generator(stage="candidate numbers", **numbers)
         capture, known, tally = self.capture, self.known_places, self.tally
+        numbers = {"seed": capture.seed, "round_number": tally["rounds"]}
+        rng = seeds.generator(stage="candidate numbers", **numbers)
         candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
         def add(table: PhotonTable, candidate: np.ndarray, number: np.ndarray, paths: int) -> None:
@@ -268,8 +268,8 @@ class _Drawing:
             if capture.has_one_budget:
                 view = rng.integers(0, self.capture.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            drawn = known.draw(capture.group_of_scope[scope], view, capture.cell_groups, path_seed)
-            add(*drawn, number, scope.size)
+            cells = capture.is_cell_of_group[capture.group_of_scope[scope]]
+            add(*known.draw(cells, view, path_seed), number, scope.size)
         tally["rounds"] += 1
         if emits:
             candidates = max(tally["candidates"] - candidates_before, 1)

@@ -3,12 +3,22 @@
 What leaves is NumPy.
 """
 
+from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
 
-from simgen.photons.candidates import Accepted, Candidates, CandidateSampler, FilmPoints, is_on_film, nothing
-from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
+from simgen.photons.candidates import (
+    Accepted,
+    Candidates,
+    CandidateSampler,
+    FilmPoints,
+    cells_of,
+    is_on_film,
+    nothing,
+    pixels_of,
+)
+from simgen.photons.majorant import NEXT_LAYERS, Samples
 from simgen.renderer import (
     FirstHits,
     PathTracer,
@@ -61,9 +71,12 @@ class WavefrontSampler(CandidateSampler):
         self.colour_of_cell = unsigned(mi, self.colours)
         tiles = majorant.layer, majorant.row, majorant.col, majorant.side_px, majorant.entry_of
         self.layer, self.row, self.col, self.side_px, self.entry_of = (signed(mi, part) for part in tiles)
-        self.dim, self.bounds = floats(mi, majorant.dim), self._upload_bounds(majorant)
+        self.dim = floats(mi, majorant.dim)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
-        self.bounds_below = self._upload_bounds(self.below)
+        below = (0 * majorant.bound,) * 2 if self.below is None else self.below.bounds
+        self.bounds, self.bounds_below = (
+            tuple(floats(mi, part) for part in both) for both in (majorant.bounds, below)
+        )
         layers = majorant.layers
         self.layer_at = signed(mi, layers.layer_at)
         self.nearness_mm = opaque(mi.Float, layers.disparity_mm / layers.step_px)
@@ -81,7 +94,7 @@ class WavefrontSampler(CandidateSampler):
         first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
         where = candidates.entry * capture.channels + candidates.colour
         bound = dr.gather(mi.Float, self.bounds[0], where)
-        guess = self._in_own_colour(first.guess, candidates)
+        guess = self.light.in_own_colour(first.guess, candidates)
         most, floor = (
             self._limit(bounds, where, candidates.colour, guess)
             for bounds in (self.bounds, self.bounds_below)
@@ -95,7 +108,7 @@ class WavefrontSampler(CandidateSampler):
         candidates, first = _take(candidates, rest), _take(first, rest)
         light = self._follow(candidates, first, seed, 0)
         most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
-        radiance = self._in_own_colour(light, candidates)
+        radiance = self.light.in_own_colour(light, candidates)
         is_kept = dr.gather(mi.Float, chance, rest) * (most - floor) < radiance - floor
         ratio = radiance / most
         dr.eval(is_kept, ratio)
@@ -103,13 +116,16 @@ class WavefrontSampler(CandidateSampler):
         photon, hit = _take(candidates, accepted), _take(first, accepted)
         candidate = dr.gather(mi.UInt32, rest, accepted)
         dr.eval(*photon, hit.shape, hit.z_mm, candidate)
-        self._require_finite(ratio, candidates, first)
+        self.require_finite(np.array(ratio), candidates, self._objects(first))
         exceeding = nothing(capture.channels).exceeding
         if len(over):
-            exceeding = self._exceeding(candidates, first, light, over)
+            candidates, first = _take(candidates, over), _take(first, over)
+            both = first.guess, gathered(light, over)
+            guess, light = (self.light.per_colour(radiance, candidates) for radiance in both)
+            dr.eval(*candidates, first.z_mm, guess, light)
+            exceeding = _samples(candidates, first.z_mm, guess, light)
         k, l, i, j = (np.array(part) for part in photon[:4])
-        object_id = capture.render_scene.object_of_shape[np.array(hit.shape)]
-        origin = {"object_id": object_id, "z_mm": np.array(hit.z_mm)}
+        origin = {"object_id": self._objects(hit), "z_mm": np.array(hit.z_mm)}
         photons = PhotonTable(k, l, i, j, np.ones(len(accepted), np.int64), **origin)
         return Accepted(photons, np.array(candidate), np.array(ratio), exceeding)
 
@@ -124,9 +140,9 @@ class WavefrontSampler(CandidateSampler):
             first = self._hit_first(recoloured)
             followed, first_of_followed = _take(recoloured, some), _take(first, some)
             radiance = self._follow(followed, first_of_followed, seed, turn)
-            self._require_finite(dr.sum(radiance), followed, first_of_followed)
-            guess = [a + b for a, b in zip(guess, self._per_colour(first.guess, recoloured), strict=True)]
-            light = [a + b for a, b in zip(light, self._per_colour(radiance, followed), strict=True)]
+            self.require_finite(np.array(dr.sum(radiance)), followed, self._objects(first_of_followed))
+            guess = list(map(add, guess, self.light.per_colour(first.guess, recoloured)))
+            light = list(map(add, light, self.light.per_colour(radiance, followed)))
             dr.eval(guess, light)
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
@@ -139,24 +155,16 @@ class WavefrontSampler(CandidateSampler):
         Its radiance (N,) in each pixel's own colour and the number of mirrors before it; and the object and
         depth of the first hit.
         """
-        mi, capture = self.mi, self.capture
+        mi = self.mi
         candidates = self._at(streams_for(mi, seed, points.view.size), points)
         first = self._hit_first(candidates)
         self.dr.make_opaque(*candidates, *first)
         sampler = streams_for(mi, seed, points.view.size, part=1)
         path = self._rays(candidates), first.record, sampler, opaque(mi.Float, above)
         light, bounces = self.tracer.mirrored_radiance(*path)
-        radiance = self._in_own_colour(light, candidates)
+        radiance = self.light.in_own_colour(light, candidates)
         self.dr.eval(radiance, bounces)
-        object_id = capture.render_scene.object_of_shape[np.array(first.shape)]
-        return np.array(radiance), np.array(bounces), object_id, np.array(first.z_mm)
-
-    def _upload_bounds(self, majorant: Majorant | None) -> tuple[Any, Any]:
-        """Both bounds of every entry; 0 without a majorant."""
-        if majorant is None:
-            nowhere = np.zeros_like(self.majorant.bound)
-            return floats(self.mi, nowhere), floats(self.mi, nowhere)
-        return floats(self.mi, majorant.bound), floats(self.mi, majorant.radiance_ratio_bound)
+        return np.array(radiance), np.array(bounces), self._objects(first), np.array(first.z_mm)
 
     def _draw(self, sampler: RandomNumbers, group: Any, view_numbers: np.ndarray | None) -> Candidates:
         """One candidate for each of these groups: tile and cell by the bound, the rest evenly."""
@@ -200,12 +208,11 @@ class WavefrontSampler(CandidateSampler):
         """Candidates of no entry at these points."""
         mi, dr, number = self.mi, self.dr, points.view.size
         k, l = np.divmod(points.view, self.capture.grid.cols)
-        row, col = points.row.astype(np.int64), points.col.astype(np.int64)
-        colour = gathered(self.colour_of_cell, unsigned(mi, row % 2 * 2 + col % 2))
+        colour = gathered(self.colour_of_cell, unsigned(mi, cells_of(points)))
         wavelength_sample = self.light.wavelength_samples(sampler, number)
         return Candidates(
             *(unsigned(mi, camera) for camera in (k, l)),
-            *(signed(mi, pixel) for pixel in (row, col)),
+            *(signed(mi, pixel) for pixel in pixels_of(points)),
             *(floats(mi, place - 0.5) for place in (points.row, points.col)),
             entry=dr.zeros(mi.UInt32, number),
             colour=colour,
@@ -257,7 +264,7 @@ class WavefrontSampler(CandidateSampler):
 
     def _hit_first(self, candidates: Candidates) -> FirstHits:
         self.dr.make_opaque(*candidates)
-        ambient = self.light.spread(self.opaque_ambient, candidates.colour, candidates.wavelength_sample)
+        ambient = self.light.spread(self.opaque_ambient, candidates)
         first = self.tracer.hit_first(self._rays(candidates), candidates.inside, ambient)
         self.dr.eval(*first)
         return first
@@ -294,28 +301,11 @@ class WavefrontSampler(CandidateSampler):
     def _rays(self, candidates: Candidates) -> Any:
         at = candidates.k, candidates.l, candidates.row_px, candidates.col_px, candidates.lens_point
         ray = film_rays(self.capture.render_scene, self.capture.rig, *at)
-        return self.light.aim(ray, candidates.colour, candidates.wavelength_sample)
+        return self.light.aim(ray, candidates)
 
-    def _require_finite(self, radiance: Any, candidates: Candidates, first: FirstHits) -> None:
-        values = np.array(radiance)
-        if not np.isfinite(values).all():
-            object_id = self.capture.render_scene.object_of_shape[np.array(first.shape)]
-            self.require_finite(values, candidates, object_id)
-
-    def _per_colour(self, radiance: Any, candidates: Candidates) -> list[Any]:
-        """Radiance that rays carry in each colour of the sensor."""
-        return self.light.per_colour(radiance, candidates.colour, candidates.wavelength_sample)
-
-    def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
-        """What each candidate's pixel gets of radiance that rays carry."""
-        return self.light.in_own_colour(radiance, candidates.colour, candidates.wavelength_sample)
-
-    def _exceeding(self, candidates: Candidates, first: FirstHits, light: Any, over: Any) -> Samples:
-        candidates, first = _take(candidates, over), _take(first, over)
-        both = first.guess, gathered(light, over)
-        guess, light_over = (self._per_colour(radiance, candidates) for radiance in both)
-        self.dr.eval(*candidates, first.z_mm, guess, light_over)
-        return _samples(candidates, first.z_mm, guess, light_over)
+    def _objects(self, first: FirstHits) -> np.ndarray:
+        """Object ids (N,) of what is hit first."""
+        return self.capture.render_scene.object_of_shape[np.array(first.shape)]
 
 
 def _take(rows: Rows, index: Any) -> Rows:

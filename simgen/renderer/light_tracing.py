@@ -5,7 +5,7 @@ Light that leaves the lamp does not: what arrives in a disc around the cameras t
 their films (particle tracing; Arvo 1986, Veach 1997, chapter 4). NumPy in and NumPy out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.base import LUMINANCE
+from simgen.base import join_rows, take_rows
 from simgen.cameras import Rig
 from simgen.renderer.backend import is_scalar, load_drjit, vectors
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -45,19 +46,6 @@ class Arrivals(NamedTuple):
     place_mm: np.ndarray
     slope: np.ndarray
 
-    def take(self, which: np.ndarray) -> "Arrivals":
-        """Some of them, by mask or index."""
-        return Arrivals(*(column[which] for column in self))
-
-
-class LitPlaces(NamedTuple):
-    """Places (N, 3) in mm that a lamp without a surface lights first, their unit normals (N, 3) on its side,
-    and the area (N,) in mm^2 that each stands for."""
-
-    point_mm: np.ndarray
-    normal: np.ndarray
-    area_mm2: np.ndarray
-
 
 class _Rays(NamedTuple):
     """Rays (N,) in the renderer's axes and unit; `power` (N, S) is what each carries at its wavelengths."""
@@ -66,10 +54,6 @@ class _Rays(NamedTuple):
     direction: np.ndarray
     power: np.ndarray
     wavelength_nm: np.ndarray
-
-    def take(self, which: np.ndarray) -> "_Rays":
-        """Some of them, by mask."""
-        return _Rays(*(column[which] for column in self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +108,7 @@ class LampTracer:
         particle = np.flatnonzero(radiance >= least_radiance)
         whole, real, pairs = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 2))
         arrivals = [Arrivals(whole, whole, real, real, real, whole, real > 0, pairs, pairs)]
-        rays, number = rays.take(particle), lamp.size
+        rays, number = take_rows(rays, particle), lamp.size
         bounces, met = np.zeros((2, number), dtype=np.int64)
         is_scattered = np.zeros(number, dtype=bool)
         power = (rays.power * weight[particle]).sum(axis=1)
@@ -143,8 +127,8 @@ class LampTracer:
             met[particle] = np.where(is_scattered[particle], met[particle], object_id)
             bounces[particle] += ~is_scattered[particle]
             goes_on = onwards.power.any(axis=1) & (bounces[particle] > 0)
-            rays, particle = onwards.take(goes_on), particle[goes_on]
-        return Arrivals(*map(np.concatenate, zip(*arrivals, strict=True))), float(brightest)
+            rays, particle = take_rows(onwards, goes_on), particle[goes_on]
+        return join_rows(arrivals), float(brightest)
 
     @cached_property
     def _light_per_power(self) -> float:
@@ -152,8 +136,11 @@ class LampTracer:
         scale_px = self.rig.grid.focal_mm / self.rig.grid.pixel_mm
         return scale_px**2 / (np.pi * (self.disc_mm * self.render_scene.frame.unit) ** 2)
 
-    def lit_places(self, number: int, seed: int) -> list[LitPlaces]:
-        """What is lit by each lamp that stands at a point, as a spot lamp, by `number` of its rays."""
+    def lit_places(self, number: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """What each lamp that stands at a point, as a spot lamp, lights first, by `number` of its rays.
+
+        Places (N, 3) in mm, their unit normals (N, 3) on its side, and the area (N,) in mm^2 of each.
+        """
         mi, dr, scene = self.render_scene.mi, load_drjit(), self.render_scene.scene
         rng, frame = np.random.default_rng(seed), self.render_scene.frame
         wavelength_nm = np.full((number, 0 if self.render_scene.filters is None else 4), MIDDLE_NM)
@@ -168,14 +155,12 @@ class LampTracer:
             area = dr.sum(power) / dr.maximum(dr.sum(lit) * dr.abs(side), np.finfo(np.float32).tiny)
             return hit.p, hit.n * dr.sign(side), dr.select(hit.is_valid() & (dr.sum(lit) > 0), area, 0.0)
 
-        places = []
         for lamp in scene.emitters():
             if mi.has_flag(lamp.flags(), mi.EmitterFlags.DeltaPosition):
                 values = self._each(partial(light, lamp), rng.random((number, 4)), wavelength_nm)
                 point, normal, area = np.split(values[values[:, 6] > 0], [3, 6], axis=1)
                 area_mm2 = area[:, 0] / (number * frame.unit**2)
-                places.append(LitPlaces(frame.points_mm(point), frame.world_directions(normal), area_mm2))
-        return places
+                yield frame.points_mm(point), frame.world_directions(normal), area_mm2
 
     def _on_film(self, rays: _Rays, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Light on a film (N,) per power of rays that pass the disc within their length, 0 of others; where

@@ -8,7 +8,7 @@ plugins could be moved (in 3.9 a turned `sdfgrid` is cut off, and scaled curves 
 
 import math
 import os
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from pcii.base import InputError, srgb_to_linear
-from simgen.assets import Assets, Triangles, cut_out, globe, paint, triangles_of
+from simgen.assets import Assets, Triangles, across_faces, cut_out, globe, paint, triangles_of
 from simgen.renderer.backend import is_spectral
 from simgen.spec import (
-    Backdrop,
     Box,
     Card,
     Cylinder,
@@ -32,6 +31,7 @@ from simgen.spec import (
     Plastic,
     Principled,
     Reflectance,
+    Scene,
     SceneObject,
     Shape,
     Sphere,
@@ -39,6 +39,8 @@ from simgen.spec import (
 )
 from simgen.spectral import spectra
 
+BACKDROP, OBJECT = "simgen:backdrop", "simgen:object"
+"""Ids of shapes, which none of a Mitsuba file has; those of objects end in their numbers."""
 SMALL_BALL_SHARE = 0.02
 """A ball that shines is a mesh if its radius is a smaller share of the scene's size. Mitsuba aims at its own
 sphere in single precision: at a radius of 0.01 of the distance light is right to 4e-4, at 0.001 to 3e-2."""
@@ -108,7 +110,69 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose @ T().rotate([0, 1, 0], y) @ T().rotate([1, 0, 0], x)
 
 
-def shape_plugin(
+def plugins_of_shapes(
+    mi: Any,
+    scene: Scene,
+    assets: Assets,
+    frame: WorldFrame,
+    emitter_of: Callable[[SceneObject], dict[str, Any] | None],
+) -> dict[str, Any]:
+    """The shapes of all objects, with their emitters, and of the backdrop by their ids.
+
+    Objects that look alike share a surface. Raises `InputError` with the name of the object at fault.
+    """
+    plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
+
+    def paint_pattern(thing: SceneObject) -> np.ndarray | None:
+        texture = thing.material.texture
+        return (
+            None if texture is None or isinstance(texture, str) else paint(texture, _aspect_of(thing.shape))
+        )
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        patterns = pool.map(paint_pattern, scene.objects)
+        for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
+            material, shape = thing.material, thing.shape
+            try:
+                # What a picture is laid on, and whether it says where, is part of how objects look.
+                has_texcoords = not isinstance(shape, Mesh) or assets.meshes[shape.file].texcoords is not None
+                kind = shape.type in ("card", "sphere") and shape.type
+                key = material, kind, _aspect_of(shape), has_texcoords
+                if key not in surfaces:
+                    surfaces[key] = mi.load_dict(_surface_plugin(mi, material, shape, assets, pattern))
+                parts = {"bsdf": surfaces[key]}
+                if (emitter := emitter_of(thing)) is not None:
+                    parts["emitter"] = mi.load_dict(emitter)
+                plugins[f"{OBJECT}{number}"] = _shape_plugin(mi, thing, assets, parts, reach_mm, frame)
+            except InputError as fault:
+                raise InputError(f"object '{thing.name}', {fault}") from None
+    if scene.backdrop is not None:  # a matt wall, seen from either side
+        wall = scene.backdrop
+        matt = {"type": "diffuse", "reflectance": _reflectance_plugin(mi, wall.reflectance)}
+        pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
+        to_world = pose @ _card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
+        bsdf = {"type": "twosided", "bsdf": matt}
+        plugins[BACKDROP] = {"type": "rectangle", "to_world": to_world, "bsdf": bsdf}
+    return plugins
+
+
+def _reach_mm(scene: Scene, assets: Assets) -> float:
+    """A distance that no two things that the cameras see are farther apart; 0 where no ball shines."""
+    if not any(isinstance(thing.shape, Sphere) and thing.material.emission for thing in scene.objects):
+        return 0.0
+    far_mm = 0.0 if scene.backdrop is None else scene.backdrop.z_mm
+    for thing in scene.objects:
+        match thing.shape:
+            case Mesh(file=file, scale=scale):
+                points_mm = assets.meshes[file].positions * np.asarray(scale)
+            case shape:
+                points_mm = triangles_of(shape, assets.meshes).positions
+        size_mm = np.linalg.norm(points_mm, axis=1).max()
+        far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
+    return 2 * far_mm
+
+
+def _shape_plugin(
     mi: Any, thing: SceneObject, assets: Assets, parts: dict[str, Any], reach_mm: float, frame: WorldFrame
 ) -> Any:
     """The Mitsuba shape (or the plugin that makes it) of an object; `parts` are its bsdf and emitter.
@@ -145,11 +209,6 @@ def _small_ball(radius_mm: float, position_mm: np.ndarray) -> Triangles:
     return replace(ball, positions=(ball.positions / np.sqrt(share)).astype(np.float32))
 
 
-def across_faces(corners: np.ndarray) -> np.ndarray:
-    """Normals (M, 3) of triangles (M, 3, 3), as long as twice their areas."""
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
 def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
     """Where a shape of this material is, as triangles in mm; all of it without an opacity.
 
@@ -183,14 +242,6 @@ def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
 
 
-def backdrop_plugin(mi: Any, wall: Backdrop, frame: WorldFrame) -> dict[str, Any]:
-    """A matt wall, seen from either side."""
-    matt = {"type": "diffuse", "reflectance": _reflectance_plugin(mi, wall.reflectance)}
-    pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
-    to_world = pose @ _card_pose(mi, 2 * wall.half_width_mm, 2 * wall.half_width_mm)
-    return {"type": "rectangle", "to_world": to_world, "bsdf": {"type": "twosided", "bsdf": matt}}
-
-
 def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
     """A mesh of triangles in mm with a surface and an emitter, moved by a matrix (4, 4)."""
     properties = mi.Properties()
@@ -213,24 +264,7 @@ def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, An
     return mesh
 
 
-def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
-    """The pixels of each object's pattern (see `paint`), None if it carries none; several at a time."""
-
-    def pixels(thing: SceneObject) -> np.ndarray | None:
-        texture = thing.material.texture
-        return None if texture is None or isinstance(texture, str) else paint(texture, aspect_of(thing.shape))
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        yield from pool.map(pixels, things)
-
-
-def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
-    """A key that is equal for objects that can share a surface, on which pictures lie alike."""
-    has_texcoords = not isinstance(shape, Mesh) or assets.meshes[shape.file].texcoords is not None
-    return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), has_texcoords
-
-
-def surface_plugin(
+def _surface_plugin(
     mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
 ) -> dict[str, Any]:
     """The surface of an object of this shape, on both sides; `pattern` are its pixels if it carries one."""
@@ -294,7 +328,7 @@ def linear_bitmap(mi: Any, pixels: np.ndarray) -> Any:
     return bitmap
 
 
-def aspect_of(shape: Shape) -> float:
+def _aspect_of(shape: Shape) -> float:
     """Width over height of what a shape's texture is laid on: a sphere's and a cylinder's go once round."""
     match shape:
         case Card() | Box():

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from pcii.base import LUMINANCE, InputError
+from simgen.assets import across_faces
 from simgen.base import shorten, suggestion
 from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
 from simgen.renderer.emission import ShiningSurface, sample_light
-from simgen.renderer.mitsuba_objects import WorldFrame, across_faces
+from simgen.renderer.mitsuba_objects import WorldFrame
 from simgen.spec import OF_RECIPES, MitsubaFile, MitsubaXml, check_unscored, names_of_objects
 from simgen.spectral import WAVELENGTH_NM, Filters, integral
 

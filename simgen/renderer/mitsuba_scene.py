@@ -4,7 +4,7 @@ Only this package names plugins, never a scene file. Rays come by the million, N
 once in compiled modes, one by one in scalar mode.
 """
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,23 +13,16 @@ import numpy as np
 
 from pcii.base import InputError
 from pcii.types import CameraGrid
-from simgen.assets import Assets, read_assets, triangles_of
+from simgen.assets import Assets, read_assets
 from simgen.renderer.backend import floats, is_scalar, load_drjit, shape_numbers, vectors
 from simgen.renderer.emission import SceneLights, ShiningSurface
-from simgen.renderer.mitsuba_objects import (
-    WorldFrame,
-    backdrop_plugin,
-    paint_patterns,
-    shape_plugin,
-    surface_key,
-    surface_plugin,
-)
+from simgen.renderer.mitsuba_objects import OBJECT, WorldFrame, plugins_of_shapes
 from simgen.renderer.mitsuba_reference import Reference, reference_to
-from simgen.spec import MOST_OBJECTS, Mesh, Scene, Sphere
+from simgen.spec import MOST_OBJECTS, Scene
 from simgen.spectral import Filters, filters_for
 
-BACKDROP, OBJECT, LIGHT = "simgen:backdrop", "simgen:object", "simgen:light"
-"""Ids of shapes, which none of a Mitsuba file has; those of objects and lights end in their numbers."""
+LIGHT = "simgen:light"
+"""What ids of lights begin with, which end in their numbers; as of `OBJECT`."""
 SHY_OF_TARGET = 1e-4
 """A ray to a target stops this share of its length before it."""
 PART = 1 << 14
@@ -92,7 +85,7 @@ class RenderScene:
 
     def first_objects(self, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Object id (N,) int16, 0 for none, of what rays from an origin (3,) in directions (N, 3) hit."""
-        return np.maximum(self._objects_hit(origin_mm, direction, np.inf), 0)
+        return np.maximum(self.objects_hit(origin_mm, direction, np.inf), 0)
 
     def first_points(
         self, origin_mm: np.ndarray, direction: np.ndarray
@@ -113,15 +106,6 @@ class RenderScene:
         points_mm = np.where(is_hit[:, None], frame.points_mm(points), np.inf)
         return points_mm, frame.world_directions(normals), self.first_objects(origin_mm, direction)
 
-    def standing_before(
-        self, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
-    ) -> np.ndarray:
-        """Object id (N,) int16 of what stands between origins and targets (N, 3), 0 of no object, -1 for
-        nothing; rays stop `shy_of_target` of their length before the target."""
-        if not len(origin_mm):
-            return np.zeros(0, dtype=np.int16)
-        return self._objects_hit(origin_mm, target_mm - origin_mm, 1 - shy_of_target)
-
     def blocked(self, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
         """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
         rays = self._rays(origin_mm, target_mm - origin_mm, 1 - SHY_OF_TARGET)
@@ -130,8 +114,11 @@ class RenderScene:
             return np.fromiter(map(ray_test, rays), dtype=bool, count=len(origin_mm))
         return np.array(ray_test(rays))
 
-    def _objects_hit(self, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> np.ndarray:
-        """Object id (N,) int16 of what rays hit first: 0 of no object, -1 for nothing."""
+    def objects_hit(self, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> np.ndarray:
+        """Object id (N,) int16 of what rays from origins (N, 3), or from one (3,), hit first within a `share`
+        of the vectors `away_mm` (N, 3): 0 of no object, -1 for nothing."""
+        if not len(away_mm):
+            return np.zeros(0, dtype=np.int16)
         rays, scene = self._rays(origin_mm, away_mm, share), self.scene
         if is_scalar(self.mi):
             ids = self.objects_by_shape()
@@ -194,9 +181,7 @@ def build(
             f"{folder}: lights: one that is not visible does not go with a medium; leave out visible"
         )
     lights = SceneLights(mi, scene, assets, frame, referenced_lux)
-    plugins = _object_plugins(lights)
-    if scene.backdrop is not None:
-        plugins[BACKDROP] = backdrop_plugin(mi, scene.backdrop, frame)
+    plugins = plugins_of_shapes(mi, scene, assets, frame, lights.object_plugin)
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"{LIGHT}{number}"] = lights.light_plugin(light)
     filters = None if curves is None else filters_for(curves, lights.main_spectrum())
@@ -248,41 +233,6 @@ def _numbered_objects(
         if len(names) > MOST_OBJECTS:
             raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
     return ids, names
-
-
-def _object_plugins(lights: SceneLights) -> dict[str, Any]:
-    """Shapes of all objects by id; objects that look alike share a surface."""
-    mi, scene, assets = lights.mi, lights.scene, lights.assets
-    plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
-    patterns = paint_patterns(scene.objects)
-    for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        try:
-            key = surface_key(thing.material, thing.shape, assets)
-            if key not in surfaces:
-                surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
-            parts = {"bsdf": surfaces[key]}
-            if (emitter := lights.object_plugin(thing)) is not None:
-                parts["emitter"] = mi.load_dict(emitter)
-            plugins[f"{OBJECT}{number}"] = shape_plugin(mi, thing, assets, parts, reach_mm, lights.frame)
-        except InputError as fault:
-            raise InputError(f"object '{thing.name}', {fault}") from None
-    return plugins
-
-
-def _reach_mm(scene: Scene, assets: Assets) -> float:
-    """A distance that no two things that the cameras see are farther apart; 0 where no ball shines."""
-    if not any(isinstance(thing.shape, Sphere) and thing.material.emission for thing in scene.objects):
-        return 0.0
-    far_mm = 0.0 if scene.backdrop is None else scene.backdrop.z_mm
-    for thing in scene.objects:
-        match thing.shape:
-            case Mesh(file=file, scale=scale):
-                points_mm = assets.meshes[file].positions * np.asarray(scale)
-            case shape:
-                points_mm = triangles_of(shape, assets.meshes).positions
-        size_mm = np.linalg.norm(points_mm, axis=1).max()
-        far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
-    return 2 * far_mm
 
 
 def _numbers_as_data(mi: Any, loaded: Any) -> None:

@@ -9,11 +9,12 @@ each ray, and needs a compiled backend.
 
 from collections.abc import Sequence
 from itertools import product
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from simgen.cameras import Rig, film_slopes, slopes_behind_lens
+from simgen.cameras import Rig
 from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.emission import sample_light
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -65,10 +66,9 @@ def film_rays(
         return [_dot([of_camera(row[col]) for col in range(len(vector))], vector) for row in rows]
 
     axis_px = of_camera(rig.axis_px[..., 0]), of_camera(rig.axis_px[..., 1])
-    x, y = film_slopes(rig.grid, row_px, col_px, axis_px)
+    x, y = rig.slopes(row_px, col_px, axis_px, lens_point)
     origin = mi.Point3f(*(of_camera(position[..., axis]) for axis in range(3)))
     if rig.lens is not None:
-        x, y = slopes_behind_lens((x, y), rig.lens, (lens_point.x, lens_point.y))
         origin += mi.Vector3f(*rotate(lens_point.x, lens_point.y, factor=frame.unit))
     direction = load_drjit().normalize(mi.Vector3f(*rotate(x, y, mi.Float(1))))
     return mi.RayDifferential3f(mi.Ray3f(origin, direction))
@@ -95,12 +95,12 @@ def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
     # Multiples of the golden ratio, less their whole parts, are evenly spread.
     multiple = number * ((5**0.5 - 1) / 2)
-    wavelength_sample = multiple - dr.floor(multiple)
     total: Any = 0.0
     for colour in light.colours_to_follow(dr.zeros(mi.UInt32, DIRECTIONS)):
-        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, DIRECTIONS), colour, wavelength_sample).wavelengths
+        pixels = SimpleNamespace(colour=colour, wavelength_sample=multiple - dr.floor(multiple))
+        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, DIRECTIONS), pixels).wavelengths
         radiance = mi.Spectrum(0) if around is None else around.eval(away)
-        visible = np.array(light.per_colour(radiance, colour, wavelength_sample))
+        visible = np.array(light.per_colour(radiance, pixels))
         total += visible.mean(axis=1, dtype=np.float64)
     return total
 

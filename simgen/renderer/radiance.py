@@ -139,24 +139,16 @@ def _surroundings_integrator(mi: Any) -> Any:
 def windows_of_objects(
     render_scene: RenderScene, camera: Camera, samples_per_pixel: int, background_samples: int
 ) -> tuple[list[Window], int]:
-    """Where objects can be seen, and how many light paths fewer samples elsewhere save."""
-    is_object = render_scene.object_of_shape[shape_numbers(render_scene.scene)] > 0
-    windows = _object_windows(camera, render_scene.corners_mm[is_object])
-    pixels = camera.grid.height * camera.grid.width
-    covered = sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
-    return windows, (samples_per_pixel - background_samples) * pixels - samples_per_pixel * covered
+    """Windows that do not overlap, outside of which no object is, and paths that fewer samples there save.
 
-
-def _object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
-    """Windows that do not overlap, outside of which the camera sees none of the boxes with corners (N, 8, 3).
-
-    The whole film is the only one if a box reaches behind the camera, or if the camera has a lens.
+    The whole film is the only one if an object's box reaches behind the camera, or if that has a lens.
     """
-    size = np.array([camera.grid.height, camera.grid.width])
-    z_mm = ((corners_mm - camera.position_mm) @ camera.rotation)[..., 2]
+    is_object = render_scene.object_of_shape[shape_numbers(render_scene.scene)] > 0
+    corners_mm, windows = render_scene.corners_mm[is_object], list[Window]()
+    height, width = camera.grid.shape_HW
+    size, z_mm = np.array([height, width]), ((corners_mm - camera.position_mm) @ camera.rotation)[..., 2]
     if len(corners_mm) and (camera.lens is not None or z_mm.min() <= 0):
-        return [(slice(0, camera.grid.height), slice(0, camera.grid.width))]
-    windows: list[Window] = []
+        windows, corners_mm = [(slice(0, height), slice(0, width))], corners_mm[:0]
     for corners in corners_mm:
         edges_px = np.clip(camera.film_px(corners)[:, ::-1] + size / 2, -size, 2 * size)
         first, stop = np.floor(edges_px.min(axis=0)), np.ceil(edges_px.max(axis=0))
@@ -168,7 +160,8 @@ def _object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
             edges = np.array([[(side.start, side.stop) for side in each] for each in (window, *met)])
             window = _window_around(edges[..., 0].min(axis=0), edges[..., 1].max(axis=0), size)
         windows.append(window)
-    return windows
+    covered = sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
+    return windows, (samples_per_pixel - background_samples) * height * width - samples_per_pixel * covered
 
 
 def _window_around(first: np.ndarray, stop: np.ndarray, size: np.ndarray) -> Window:

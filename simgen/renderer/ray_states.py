@@ -58,20 +58,23 @@ def _mixed(mi: Any, number: Any) -> Any:
 
 
 class Light:
-    """What rays carry for pixels of a `colour` (its number): here linear sRGB, all colours at once."""
+    """What rays carry for `pixels`: here linear sRGB, all colours at once.
+
+    `pixels` have a `colour` (its number) and a `wavelength_sample`, which decides on wavelengths at random.
+    """
 
     def __init__(self, mi: Any, cfa: str | None) -> None:
         self.mi, self.cfa = mi, cfa
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
-        """Random numbers that decide on wavelengths; zeros where there are none."""
+        """A `wavelength_sample` of each of so many pixels; zeros where there are no wavelengths."""
         return load_drjit().zeros(self.mi.Float, number)
 
-    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
+    def aim(self, ray: Any, pixels: Any) -> Any:
         """The ray with the wavelengths that it is followed at."""
         return ray
 
-    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
+    def spread(self, ambient: Any, pixels: Any) -> Any:
         """Light from all around, which is `ambient` in each colour, as rays carry it."""
         return self.mi.Color3f(*ambient) if len(ambient) == 3 else self.mi.Color3f(ambient[0])
 
@@ -79,11 +82,11 @@ class Light:
         """Colours to follow rays in, one after the other, so that together they show all."""
         yield colour
 
-    def in_own_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> Any:
+    def in_own_colour(self, radiance: Any, pixels: Any) -> Any:
         """What each pixel gets, in its own colour, of radiance that rays carry."""
-        return _of_colour(self.per_colour(radiance, colour, wavelength_sample), colour)
+        return _of_colour(self.per_colour(radiance, pixels), pixels.colour)
 
-    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+    def per_colour(self, radiance: Any, pixels: Any) -> list[Any]:
         """Radiance in each colour that these wavelengths show, 0 in the others; luminance without a CFA."""
         if self.cfa is not None:
             return list(radiance)
@@ -102,36 +105,36 @@ class SpectralLight(Light):
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
         return sampler.next_1d()
 
-    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
-        ray.wavelengths, _ = self._draw(colour, wavelength_sample)
+    def aim(self, ray: Any, pixels: Any) -> Any:
+        ray.wavelengths, _ = self._draw(pixels)
         return ray
 
-    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
+    def spread(self, ambient: Any, pixels: Any) -> Any:
         # It has the spectrum of most of the light.
-        wavelengths_nm, _ = self._draw(colour, wavelength_sample)
-        white = gathered(self.white, colour)
-        relative = load_drjit().select(white > 0, _of_colour(ambient, colour) / white, 0)
+        wavelengths_nm, _ = self._draw(pixels)
+        white = gathered(self.white, pixels.colour)
+        relative = load_drjit().select(white > 0, _of_colour(ambient, pixels.colour) / white, 0)
         return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in wavelengths_nm))
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
         for other in range(self.channels):
             yield load_drjit().full(self.mi.UInt32, other, len(colour))
 
-    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        dr, (_, weight) = load_drjit(), self._draw(colour, wavelength_sample)
+    def per_colour(self, radiance: Any, pixels: Any) -> list[Any]:
+        dr, (_, weight) = load_drjit(), self._draw(pixels)
         total = dr.sum(radiance * weight)
-        return [dr.select(colour == other, total, 0) for other in range(self.channels)]
+        return [dr.select(pixels.colour == other, total, 0) for other in range(self.channels)]
 
-    def _draw(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
+    def _draw(self, pixels: Any) -> tuple[Any, Any]:
         """Wavelengths and their weights, as `Filters.draw` has them."""
         mi, wavelengths_nm, weight = self.mi, [], []
         for hero in range(HEROES):
-            place = (wavelength_sample + hero) * (CELLS / HEROES)
+            place = (pixels.wavelength_sample + hero) * (CELLS / HEROES)
             cell = load_drjit().minimum(mi.UInt32(place), CELLS - 1)
-            first = colour * (CELLS + 1) + cell
+            first = pixels.colour * (CELLS + 1) + cell
             low, high = gathered(self.cell_nm, first), gathered(self.cell_nm, first + 1)
             here_nm = low + (high - low) * (place - mi.Float(cell))
-            curve = self._at(self.sensitivity, here_nm, colour * WAVELENGTH_NM.size)
+            curve = self._at(self.sensitivity, here_nm, pixels.colour * WAVELENGTH_NM.size)
             wavelengths_nm.append(here_nm)
             weight.append(curve * (high - low) * (CELLS / HEROES))
         return mi.Spectrum(*wavelengths_nm), mi.Spectrum(*weight)

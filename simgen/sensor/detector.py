@@ -14,18 +14,13 @@ Full-light images: electrons up to the full well, the noise of reading them, and
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from pcii.base import InputError
-from pcii.exchange import open_array
-from pcii.types import CameraGrid, PhotonCounts, colour_index, mosaic, read_only
-from simgen.base import asset
+from pcii.types import CameraGrid, PhotonCounts, mosaic
 from simgen.base import random_streams as seeds
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
 from simgen.spec import Exposure, Photons, Sensor
-from simgen.spectral import sensitivity
 
 PHOTONS_PER_LUMEN_SECOND = 555e-9 / (683 * 6.62607015e-34 * 299792458)
 """Photons of 555 nm; CODATA values of h and c, SI value of the luminous efficacy."""
@@ -38,79 +33,6 @@ def photons_per_radiance(exposure: Exposure, pixel_mm: float) -> float:
     illuminance_per_luminance = math.pi / (4 * exposure.f_number**2)
     pixel_m2 = (pixel_mm * 1e-3) ** 2
     return PHOTONS_PER_LUMEN_SECOND * illuminance_per_luminance * pixel_m2 * exposure.time_s
-
-
-def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:
-    """Relative sensitivities (C, N) of the sensor's camera by wavelength, None in RGB mode.
-
-    A file of sensitivities is looked up in `recipe_folder`. A monochrome sensor takes G, or the one curve
-    that there is. Raises `InputError` for a camera that is not known or has too few curves.
-    """
-    if sensor.camera is None:
-        return None
-    curves = sensitivity(sensor.camera, recipe_folder)
-    if sensor.bayer is None:
-        return curves[len(curves) // 2 :][:1]
-    if len(curves) == 1:
-        raise InputError(
-            f"sensor.camera: {sensor.camera!r} has one curve, and a Bayer sensor needs three; "
-            "set sensor.cfa to 'none'"
-        )
-    return curves
-
-
-def dark_map(sensor: Sensor, grid: CameraGrid, recipe_folder: Path) -> np.ndarray | None:
-    """Mean counts without light, (H, W) or (K, L, H, W) float64, of the file that `sensor.hot_pixels` names.
-
-    None without one. Raises `InputError` for a file that is not in `recipe_folder` or no .npy file, for
-    another shape, and for what are no finite numbers from 0.
-    """
-    if sensor.hot_pixels is None:
-        return None
-    path = asset(recipe_folder, sensor.hot_pixels, "sensor.hot_pixels")
-    counts = open_array(path)
-    if counts.shape not in (grid.shape_HW, grid.shape_KLHW):
-        expected = f"(H, W) = {grid.shape_HW}, or (K, L, H, W) = {grid.shape_KLHW}"
-        raise InputError(f"{path}: expected mean dark counts {expected}, got {counts.shape}")
-    if counts.dtype.kind not in "fiu" or not ((counts >= 0) & (counts < np.inf)).all():
-        raise InputError(f"{path}: expected mean dark counts that are finite numbers from 0")
-    return read_only(np.array(counts, dtype=np.float64))
-
-
-def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
-    """Photons of each view (V, C or 1) for multinomial statistics, None for Poisson.
-
-    `energies` (V, C or 1) are those of `scope_energies`. With scope "scene" the budget is shared
-    among the views at random in proportion to their light; else each scope gets it exactly. A scope
-    without light gets none.
-    """
-    if photons.statistics == "poisson":
-        return None
-    budget = round(photons.budget)
-    if photons.scope == "scene":
-        total = energies.sum()
-        share = rng.multinomial(budget, energies[:, 0] / total) if total > 0 else energies[:, 0] * 0
-        return share[:, None].astype(np.int64)
-    return np.where(energies > 0, budget, 0)
-
-
-def draw_counts(
-    rates: np.ndarray, cfa: str | None, rng: np.random.Generator, totals: np.ndarray | None
-) -> np.ndarray:
-    """Photon counts (H, W), int64: Poisson with mean `rates`, or multinomial with fixed `totals`.
-
-    `totals` holds one number for the view, or one for each colour.
-    """
-    if totals is None:
-        return rng.poisson(rates)
-    counts, colours = np.zeros(rates.shape, dtype=np.int64), np.zeros(rates.shape, np.uint8)
-    if totals.size > 1:
-        colours = colour_index(rates.shape[0], rates.shape[1], cfa)
-    for colour, total in enumerate(totals):
-        mask = colours == colour
-        if total > 0:
-            counts[mask] = rng.multinomial(total, rates[mask] / rates[mask].sum())
-    return counts
 
 
 def nested_subset(

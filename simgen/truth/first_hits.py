@@ -3,14 +3,12 @@
 Planar depth, object ids and normals are those of the ray through the pixel's centre, nothing filtered.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.base import Report, silent
 from pcii.types import CameraGrid
-from simgen.cameras import Camera, Cameras, Rig, as_rig, centre_camera
+from simgen.cameras import Camera, Cameras, as_rig, centre_camera
 from simgen.renderer import RenderScene, sensor_plugin
 
 BESIDE_EDGE_PX = 0.01
@@ -18,17 +16,11 @@ BESIDE_EDGE_PX = 0.01
 farther than float32 rounds, and less than anything that is worth a pixel."""
 LEAST_STEP = 1e-3
 """Share of the depth by which a pixel is behind its neighbours before it is looked at again."""
-IN_FOCUS_PX = 1.0
-"""A point is in focus where its blur half-extent is at most this."""
 COVERAGE_SAMPLES = 233
 """Rays through a pixel, on a Fibonacci lattice. An edge along one of its lines is worst: half of the some
 15 points of a line may be on the wrong side, 3 % of the pixel; most edges are known to 1 %."""
 LATTICE_GENERATOR = 144
 PIXELS_AT_ONCE = 1 << 13
-OFF_SURFACE = 1e-5
-"""Rays start so far off their surface, in units of 1 mm + the point's largest coordinate (float32 rays)."""
-BOX_MARGIN = 1e-6
-"""Boxes around shapes are grown by this share of their coordinates, more than rounding may be off."""
 
 
 @dataclass(frozen=True)
@@ -52,20 +44,6 @@ def first_hits_at_centre(render_scene: RenderScene, grid: CameraGrid) -> FirstHi
 def first_hits_of_view(render_scene: RenderScene, cameras: Cameras, k: int, l: int) -> FirstHits:
     """First hits of camera (k, l) where it really is; with a lens, those of the rays through its centre."""
     return _first_hits(render_scene, as_rig(cameras).pinhole(k, l))
-
-
-def in_focus(grid: CameraGrid, z_mm: np.ndarray, planes_mm: Sequence[float]) -> np.ndarray:
-    """Which pixels are in focus at each plane, (Z, H, W) bool: their blur half-extent is at most 1 px.
-
-    The outermost camera, at distance A from the centre of the grid along an axis, sees a point at depth z
-    displaced by f A / z on its film, and a section at z0 takes f A / z0 back. What is left over is the
-    half-extent; cameras are taken to stand where they ought to.
-    """
-    farthest_mm = np.abs(as_rig(grid).position_mm).max()
-    seen_px = grid.focal_mm * farthest_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
-    back_px = [grid.focal_mm * farthest_mm / (plane * grid.pixel_mm) for plane in planes_mm]
-    masks = [np.abs(seen_px - shift_px) <= IN_FOCUS_PX for shift_px in back_px]
-    return np.array(masks, dtype=bool).reshape(len(masks), *seen_px.shape)
 
 
 def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
@@ -143,70 +121,3 @@ def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -
         hit_id = render_scene.first_objects(camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
         share[i, j] = (hit_id == object_id[i, j, None]).mean(axis=1)
     return share
-
-
-def visible_views(
-    render_scene: RenderScene, cameras: Cameras, hits: FirstHits, report: Report = silent
-) -> tuple[np.ndarray, int]:
-    """Number (H, W) uint16 of cameras that see each first hit of the virtual centre, and rays traced.
-
-    A camera sees a point that faces it, that falls on its film, and from which nothing stands in the way;
-    0 for a miss. Rays start 0.006 mm (at 600 mm) off the surface, more than float32 rounds: what stands
-    nearer is no obstacle, and where two surfaces meet, a point that near to the other is lost.
-
-    Skipped exactly: if no shape's box reaches into the pyramid between a point and the rectangle of all
-    cameras, nothing stands in any camera's way, and no ray is traced.
-    """
-    H, W = hits.z_mm.shape
-    rig = as_rig(cameras)
-    grid = rig.grid
-    row, col = np.nonzero(np.isfinite(hits.z_mm))
-    normal = hits.normal[row, col].astype(np.float64)
-    point = centre_camera(grid).towards(row, col) * hits.z_mm[row, col, None].astype(np.float64)
-    start = point + normal * (OFF_SURFACE * (1 + np.abs(point).max(axis=1, initial=0)))[:, None]
-    may_be_blocked = _can_be_blocked(render_scene, rig, start)
-    facing = (normal * point).sum(axis=1)
-    count, traced = np.zeros(row.size, dtype=np.uint16), 0
-    for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        camera = rig.pinhole(k, l)
-        # It faces a point if normal . (camera - point) > 0.
-        is_visible = camera.on_film(point) & (normal @ camera.position_mm > facing)
-        tested = np.flatnonzero(is_visible & may_be_blocked)
-        if tested.size:
-            is_visible[tested] = ~render_scene.blocked(start[tested], camera.position_mm)
-        count += is_visible
-        traced += tested.size
-        report("visibility", done, grid.view_count)
-    result = np.zeros((H, W), dtype=np.uint16)
-    result[row, col] = count
-    return result, traced
-
-
-def _can_be_blocked(render_scene: RenderScene, rig: Rig, start: np.ndarray) -> np.ndarray:
-    """Whether a shape's box may reach between points (N, 3) and any camera; never False by mistake.
-
-    At depth s the pyramid from a point at depth z to the cameras is a rectangle, whose sides move linearly
-    with s: over the depths of a box each is farthest out at one of the two ends.
-    """
-    x_mm, y_mm, z_mm = np.moveaxis(rig.position_mm, -1, 0)
-    if z_mm.any():  # cameras that are not in one plane make no such pyramid
-        return np.ones(len(start), dtype=bool)
-    may_be_blocked, z = np.zeros(len(start), dtype=bool), start[:, 2]
-    limits_mm = [(x_mm.min(), x_mm.max()), (y_mm.min(), y_mm.max())]
-    for low, high in shape_boxes_mm(render_scene):
-        margin = BOX_MARGIN * np.maximum(np.abs(low), np.abs(high))
-        low, high = low - margin, high + margin
-        reaches = (low[2] <= z) & (high[2] >= 0)
-        ends = [np.clip(side[2], 0, z) / z for side in (low, high)]
-        for axis, (first, last) in enumerate(limits_mm):
-            least = np.minimum(*(start[:, axis] * s + first * (1 - s) for s in ends))
-            most = np.maximum(*(start[:, axis] * s + last * (1 - s) for s in ends))
-            reaches &= (least <= high[axis]) & (most >= low[axis])
-        may_be_blocked |= reaches
-    return may_be_blocked
-
-
-def shape_boxes_mm(render_scene: RenderScene) -> np.ndarray:
-    """Bounding boxes (N, 2, 3) of the renderer's shapes in the world: least and largest X, Y, Z."""
-    corners_mm = render_scene.corners_mm
-    return np.stack([corners_mm.min(axis=1), corners_mm.max(axis=1)], axis=1)

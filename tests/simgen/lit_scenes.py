@@ -11,9 +11,10 @@ from pcii import Optics
 from pcii.store import write_exr_safely
 from pcii.types import CameraGrid, colour_index, mosaic
 from simgen.cameras import Cameras
+from simgen.dataset import sensitivities
 from simgen.photons import Capture, thin_photons
 from simgen.renderer import RenderScene, backend, build, render_view
-from simgen.sensor import PhotonTable, sensitivities
+from simgen.sensor import PhotonTable
 from simgen.spec import Photons, Scene, Sensor
 
 CAMERA = "Nikon 5100 (NPL)"

@@ -1,5 +1,6 @@
 """Properties of sections, photons, light and masks, for any numbers: see also every other `@given`."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from twins import unit_grid, variance_of
 import pcii
 from pcii.sections import view_samples
 from pcii.types import PATTERNS, FocalPlanes, Light, photon_rates, scope_energies
-from simgen.cameras import as_rig, film_slopes, slopes_behind_lens
-from simgen.sensor import fixed_totals
+from simgen.cameras import as_rig
+from simgen.dataset import fixed_totals
 from simgen.spec import Lens, Photons
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
@@ -103,8 +104,8 @@ def test_a_ray_through_a_point_of_the_film_leads_back_to_it(grid, row, col, z_mm
 @given(grids, st.floats(0.1, 50), st.floats(10, 1e4), st.floats(-9, 9), st.floats(-9, 9), SHARES, SHARES)
 def test_rays_of_a_lens_meet_where_it_is_in_focus(grid, aperture, focus, row, col, u, v) -> None:
     lens = Lens(aperture_mm=aperture, focus_mm=focus)
-    chief = film_slopes(grid, row, col, (0.0, 0.0))
     point = ((u - 0.5) * aperture, (v - 0.5) * aperture)
-    bent = slopes_behind_lens(chief, lens, point)
+    chief = as_rig(grid).slopes(row, col, (0.0, 0.0), point)
+    bent = replace(as_rig(grid), lens=lens).slopes(row, col, (0.0, 0.0), point)
     for axis in (0, 1):
         assert point[axis] + focus * bent[axis] == pytest.approx(focus * chief[axis], abs=1e-9 * focus)

@@ -76,6 +76,14 @@ def test_a_small_lamp_behind_a_tilted_slab_gives_its_light(size_mm: float) -> No
         assert photons / view.sum() == pytest.approx(expected / (expected + others), abs=0.02)
 
 
+def test_glass_in_the_light_of_points_alone_has_photons() -> None:
+    """No path from a camera meets a lamp without a surface, so that none is followed to mirrors and glass."""
+    point = simgen.PointLight(position_mm=(0, -200, 100), intensity_cd=5.0)
+    things = (wall(700.0), glass(simgen.Sphere(radius_mm=20), 500.0))
+    scene = simgen.Scene(title="glass", objects=things, lights=(point,))
+    assert simgen.draw_photons(scene, GRID, budget=200, max_depth=6)[0].total > 0
+
+
 @pytest.mark.parametrize("cutoff_deg", [0.1, 3.0])
 def test_the_dot_of_a_spot_lamp_has_its_light(cutoff_deg: float) -> None:
     radius_mm = 300 * np.tan(np.radians(cutoff_deg))

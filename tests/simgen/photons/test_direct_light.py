@@ -131,11 +131,10 @@ def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[
     view = np.arange(4096) % rig.grid.view_count
     found = sampler.film_points(view, np.random.default_rng(1))
     highest = max(float(one.radiance.max()) for one in sampler.surfaces)
-    row, col = found.row_px, found.col_px
-    inside = (row > -0.5) & (row < rig.grid.height - 0.5) & (col > -0.5) & (col < rig.grid.width - 0.5)
+    inside = (found.row > 0) & (found.row < rig.grid.height) & (found.col > 0) & (found.col < rig.grid.width)
     used = inside * found.sent * highest / found.bound
-    kept = sampler.arriving(view, np.random.default_rng(2))
-    return sampler.mass * kept.row.size / view.size, float(used.max())
+    kept, *_ = sampler.arriving(view, np.random.default_rng(2))
+    return sampler.mass * kept.size / view.size, float(used.max())
 
 
 @pytest.mark.renders

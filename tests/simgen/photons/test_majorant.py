@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pcii.types import CameraGrid
+from simgen.base import take_rows
 from simgen.photons import MAX_RAYS, Majorant, Samples, fit, layers_for, tile_px_for
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
@@ -42,7 +43,7 @@ def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Maj
 
 def test_bounds_hold_what_was_found_and_are_never_black(majorant: Majorant) -> None:
     samples = pilot(1)
-    known = samples.take(samples.followed)
+    known = take_rows(samples, samples.followed)
     bound = majorant.bound[majorant.owner_of(known)]
     assert (known.light <= bound * (1 + 1e-6)).all()  # bounds are found in single precision
     assert (majorant.bound >= DIM).all()

@@ -1,6 +1,7 @@
 """Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
 
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -227,7 +228,7 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
 def too_low(explored: Plan, factor: float) -> Plan:
     """The same with bounds that most paths exceed."""
     assert explored.majorant is not None
-    majorant = explored.majorant.copy()
+    majorant = deepcopy(explored.majorant)
     majorant.scale(factor)
     return replace(explored, majorant=majorant)
 

@@ -12,7 +12,8 @@ from scipy import stats
 from pcii import Optics
 from pcii.base import InputError
 from pcii.types import CameraGrid, colour_index, mosaic
-from simgen.sensor import PhotonTable, dark_map, detect, draw_counts, full_light_image, no_photons, read_out
+from simgen.dataset import dark_map, draw_counts
+from simgen.sensor import PhotonTable, detect, full_light_image, no_photons, read_out
 from simgen.spec import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)

@@ -320,7 +320,7 @@ def test_no_ray_is_skipped_that_could_be_blocked(
         scene = build(backend.load(), world, tmp_path, 2)
     hits = first_hits_at_centre(scene, of)
     views, traced = visible_views(scene, of, hits)
-    of_all = "simgen.truth.first_hits._can_be_blocked"
+    of_all = "simgen.truth.truth_file._can_be_blocked"
     monkeypatch.setattr(of_all, lambda *given: np.ones(len(given[2]), dtype=bool))
     exhaustive, all_rays = visible_views(scene, of, hits)
     np.testing.assert_array_equal(views, exhaustive)
