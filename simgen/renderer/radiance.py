@@ -108,7 +108,9 @@ def _mean_of_paths(
     total, rest = np.zeros(()), samples
     for part in PARTS:
         while rest >= part:
-            film = {"sensor": sensor, "spp": part, "seed": int(rng.integers(1 << 32))}
+            # Dr.Jit takes what a single path carries for constants, and the integrator's loop then fails.
+            paths = max(part, 2) if camera.grid.shape_HW == (1, 1) else part
+            film = {"sensor": sensor, "spp": paths, "seed": int(rng.integers(1 << 32))}
             image = np.array(mi.render(render_scene.scene, **film))
             if hidden is not None:  # of the same rays, so that what is left has no noise of it
                 surroundings = np.array(mi.render(render_scene.scene, integrator=hidden, **film))

@@ -82,6 +82,8 @@ def test_glass_in_the_light_of_points_alone_has_photons() -> None:
     things = (wall(700.0), glass(simgen.Sphere(radius_mm=20), 500.0))
     scene = simgen.Scene(title="glass", objects=things, lights=(point,))
     assert simgen.draw_photons(scene, GRID, budget=200, max_depth=6)[0].total > 0
+    alone, pixel = scene.change(objects=things[1:]), replace(GRID, height=1, width=1, cols=1)
+    assert simgen.draw_photons(alone, pixel, budget=200, max_depth=6)[0].total == 0
 
 
 @pytest.mark.parametrize("cutoff_deg", [0.1, 3.0])
