@@ -6,7 +6,7 @@ frame, in blocks if it is large. In tables a column or row of which nothing is k
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.base import box_around, each_in_threads, write_bytes_safely
-from pcii.evaluation import NamedMethod, depth_name, mean_interval, software_of
+from pcii.evaluation import NamedMethod, depth_name, software_of
 from pcii.figures import (
     DEPTH_COLOURS,
     ERROR_COLOURS,
@@ -36,10 +36,10 @@ from pcii.figures import (
     smoothing_for,
     text_table,
 )
-from pcii.metrics import TrueFocus, entropy_region
-from pcii.sections import pooled_estimate, pooled_samples, reconstruct, region_entropy_bits, section_window_px
+from pcii.metrics import TrueFocus, entropy_half_widths
+from pcii.sections import reconstruct
 from pcii.store import machine
-from pcii.types import FocalPlanes, PhotonCounts, Sections, Truth, colours_and_samples, total_disparity_px
+from pcii.types import FocalPlanes, Sections, colours_and_samples, total_disparity_px
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -56,16 +56,21 @@ SECTIONS_AT_ONCE = 4
 """Sections of the slider in memory at once; each such group reads all views."""
 UNSATURATED_SHARE = 0.95
 """Share of the errors of depth that lie within the scale of their colours."""
-NUMBERS = ("iou", "everything", "precision", "recall", "f1", "boundary_f", "photon_precision")
-NUMBERS += ("photon_recall", "entropy_before", "entropy_after", "claimed_share", "false_share")
-"""Columns of the scores after those that say what is scored."""
-NAMES = {"iou": "IoU", "everything": "IoU of all claimed", "f1": "F1", "boundary_f": "boundary F"}
-NAMES |= {"false_share": "claimed falsely"}
-"""Names of columns, where they are not those of the scores."""
-JACKKNIFE_GROUPS = 10
-"""Intervals of so few pseudo-values are 15 % longer than those of many, and take a fraction of the time."""
-MAX_JACKKNIFE_EVENTS = 5_000_000
-"""With more pixels that have photons, intervals are narrower than the digits that are shown."""
+NUMBERS = {
+    "iou": "IoU",
+    "everything": "IoU of all claimed",
+    "precision": "precision",
+    "recall": "recall",
+    "f1": "F1",
+    "boundary_f": "boundary F",
+    "photon_precision": "photon precision",
+    "photon_recall": "photon recall",
+    "entropy_before": "entropy before",
+    "entropy_after": "entropy after",
+    "claimed_share": "claimed share",
+    "false_share": "claimed falsely",
+}
+"""Columns of the scores after those that say what is scored, and their names."""
 
 Panel = dict[str, str]
 """An `image` as a data URI and its `caption`; of maps also the colour `bar`."""
@@ -191,7 +196,7 @@ def _entropy_table(outcome: Outcome) -> "DataFrame":
     objects, dataset = outcome.score.objects, outcome.dataset
     half_widths: list[dict[str, float]] = []
     if objects and dataset.has_counts and dataset.truth is not None:
-        half_widths = _entropy_half_widths(dataset.counts, outcome.sections, dataset.truth)
+        half_widths = entropy_half_widths(dataset.counts, outcome.sections, dataset.truth)
     rows: list[tuple[str, ...]] = []
     for row, half in zip(objects, half_widths or [{}] * len(objects), strict=True):
         entropy = row["entropy"]
@@ -203,51 +208,6 @@ def _entropy_table(outcome: Outcome) -> "DataFrame":
             texts |= {z: emphasised(texts[z]) for z, bits in entropy.items() if bits == lowest}
         rows.append((row["name"], *texts.values()))
     return text_table(rows, ("object", *(f"{z:g} mm" for z in outcome.sections.z_mm)))
-
-
-def _entropy_half_widths(counts: PhotonCounts, sections: Sections, truth: Truth) -> list[dict[str, float]]:
-    """Half the 95 % interval of each entropy in `Score.objects`, in bits, by depth spelled as there.
-
-    A jackknife over photons (Quenouille 1956; Tukey 1958): every photon is in one of G random groups. With H
-    the entropy of all photons and H_g that of all but group g, the pseudo-values G H - (G - 1) H_g have about
-    the mean H, and their interval by Student's t is that of H over draws of the photons. Its variance is
-    rather too large than too small (Efron and Stein 1981). Objects that are not seen have none; more than
-    `MAX_JACKKNIFE_EVENTS` events, or fewer than G photons, give an empty list. `sections` are of `counts`.
-    """
-    if counts.total < JACKKNIFE_GROUPS or counts.events.n.size > MAX_JACKKNIFE_EVENTS:
-        return []
-    regions = [entropy_region(sections.grid, truth, number, sections.z_mm) for number in sorted(truth.names)]
-    window_px = section_window_px(sections)
-    samples = pooled_samples(sections, window_px)
-
-    def entropies(counts_ZHWC: np.ndarray) -> np.ndarray:
-        """Entropies (objects, planes) of Eq. 9, as `score` computes them."""
-        stack = Sections(sections.planes, counts_ZHWC, sections.coverage)
-        pooled = pooled_estimate(stack, window_px, samples)
-        tops = pooled.max(axis=(0, 1, 2))
-        return np.array([[region_entropy_bits(plane, each, tops) for plane in pooled] for each in regions])
-
-    groups = (reconstruct(group, sections.planes).counts for group in _photon_groups(counts))
-    without_group = [entropies(sections.counts - group) for group in groups]
-    G, of_all = JACKKNIFE_GROUPS, entropies(sections.counts)
-    pseudo_values = G * of_all - (G - 1) * np.stack(without_group)  # (groups, objects, planes)
-    half_widths: list[dict[str, float]] = []
-    for values, region in zip(np.moveaxis(pseudo_values, 0, -1), regions, strict=True):
-        intervals = map(mean_interval, values if region.any() else ())
-        half = (interval.high - interval.mean for interval in intervals)
-        half_widths.append({f"{z:g}": bits for z, bits in zip(sections.z_mm, half, strict=False)})
-    return half_widths
-
-
-def _photon_groups(counts: PhotonCounts) -> Iterator[PhotonCounts]:
-    """The photons in `JACKKNIFE_GROUPS` groups, the same whenever this is called."""
-    rng, events = np.random.default_rng(0), counts.events
-    remaining = events.n.copy()
-    for group in range(JACKKNIFE_GROUPS):
-        n = rng.binomial(remaining, 1 / (JACKKNIFE_GROUPS - group))
-        remaining -= n
-        places = (axis[n > 0] for axis in (events.k, events.l, events.i, events.j, n))
-        yield PhotonCounts.from_events(*places, grid=counts.grid, cfa=counts.cfa)
 
 
 def _score_table(outcome: Outcome) -> "DataFrame":
@@ -265,7 +225,7 @@ def _score_table(outcome: Outcome) -> "DataFrame":
         objects = "all in focus" if row["truth"] == "pixel" else row["object"] or "none at this plane"
         texts = [f"{row['z_mm']:g} mm", row["method"], row["truth"], objects][: len(words)]
         cells.append((*texts, *(NOT_KNOWN if row[key] is None else f"{row[key]:.3f}" for key in numbers)))
-    header = (*words, *(NAMES.get(key, key.replace("_", " ")) for key in numbers))
+    header = (*words, *(NUMBERS[key] for key in numbers))
     return text_table(cells, header, words=len(words))
 
 
