@@ -85,6 +85,8 @@ def _charts(table: "DataFrame") -> Iterator[tuple[str, str]]:
     for measure in summary.DECISIVE:
         methods = sorted(table["method"][table["measure"] == measure].unique())
         yield f"{summary.AXES[measure]} against photons and time", _accuracy_plot(table, methods, measure)
+    # Depths may have confidence where no object is scored, and so no decisive measure.
+    methods = sorted({*methods, *table["method"][table["measure"].str.startswith("reliability.")]})
     yield "share of correct depths against confidence, by light", _calibration_plot(table, methods)
 
 

@@ -136,7 +136,7 @@ def _photon_findings(facts: Facts) -> Iterator[Finding]:
     """Photons of each object, of what is none, saturation, dark counts; none without counts or light."""
     if facts.plan is None or facts.luminance <= 0 or not facts.plan.photons_per_view > 0:
         return
-    total = _photons_per_view(facts, np.ones(facts.colour_share.size))
+    total = _photons_per_view(facts, np.sign(facts.colour_share))  # a colour without light has none
     if facts.visible_objects:
         yield from (_object_finding(facts, thing, total) for thing in facts.visible_objects)
         yield from _other_findings(facts, total)

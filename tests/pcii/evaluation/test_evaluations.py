@@ -289,3 +289,12 @@ def test_depths_are_given_where_the_recipe_names_none(
     frame = evaluate([series], out, methods=["by count"], z_mm=[1]).frame
     depths = frame.groupby("scene", observed=True)["z_mm"].unique().map(sorted).to_dict()
     assert depths == {"by hand (analysis.z_mm=[1.0])": [1], "by hand (analysis.z_mm=[1.0, 2.0])": [1, 2]}
+
+
+def test_depth_where_no_object_is_scored(tmp_path: Path) -> None:
+    """Has confidence, which the page shows, and no share of depths within 1 px."""
+    data = write_dataset(tmp_path / "data", 1, {OWN: 10})
+    rewrite_manifest(data, unscored=[1, 2])
+    evaluation = evaluate([data], tmp_path / "out", methods=["depth:variance-sweep"])
+    assert evaluation.frame["within_1px"].isna().all()
+    assert "share of correct depths against confidence" in (tmp_path / "out/evaluation.html").read_text()

@@ -19,6 +19,7 @@ from simgen.spec import Recipe, Scene
 
 SKY = {"type": "uniform", "luminance_cd_m2": 100.0}
 EVEN = np.full(3, 0.25)
+RED = np.array([1.0, 0.0, 0.0])
 SPREAD_PX_MM = 9 * 50 * 5 / 0.0352
 """Of the paper's ten cameras: px of disparity between the outermost, times depth."""
 
@@ -65,6 +66,8 @@ OF_UNSCORED = "25.0% of the photons come from objects that count in no score"
 PAIR = thing("small", 540, share=0.001), thing("large", 620, share=0.1)
 # 22500 over all views on 0.0225 x 1024^2 pixels: 0.954 each, of 250 x 0.1 + 500 x 0.2 + 250 x 0.4 = 225.
 COLOURED = thing("a", 540, share=0.0225, light=np.array([0.1, 0.2, 0.4]))
+IN_RED = thing("a", 540, share=0.0225, light=np.array([0.1, 0.0, 0.0]))
+PER_CHANNEL = {"photons": {"scope": "channel"}}
 
 
 def apart(px: float) -> Facts:
@@ -137,7 +140,8 @@ CASES: dict[str, list[tuple[Facts, str | None, str]]] = {
     "photons": [
         (facts(COLOURED), "ok", "a: 225 per view (22.5%), 22,500 in all, 0.95 per voxel"),
         # 1000 / 3 x 0.7, and 12.5 + 100 + 25.
-        (facts(COLOURED, recipe={"photons": {"scope": "channel"}}), "ok", "a: 233 per view"),
+        (facts(COLOURED, recipe=PER_CHANNEL), "ok", "a: 233 per view"),
+        (facts(IN_RED, recipe=PER_CHANNEL, colour_share=RED), "ok", "a: 33 per view (10.0%)"),
         (facts(COLOURED, recipe=sensor(quantum_efficiency=[0.5, 1.0, 0.25])), "ok", "a: 138 per view"),
         (facts(LIT, other_shares=OTHERS), "warn", OF_OTHERS),
         (facts(replace(LIT, is_scored=False), other_shares={"the backdrop": EVEN}), "ok", OF_UNSCORED),
