@@ -61,7 +61,8 @@ def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) 
     def evenness(sections: Sections, plane: int) -> np.ndarray:
         assert sections.variance is not None
         freedom = np.maximum(sections.coverage[plane].astype(np.float64) - 1, 0)
-        noise = sections.estimate[plane] if is_counted else 0.0
+        # Where all frames of all samples are full, no noise is left, and their estimate is infinite.
+        noise = np.nan_to_num(sections.estimate[plane], posinf=0.0) if is_counted else 0.0
         excess = (freedom * (sections.variance[plane] - noise)).sum(axis=-1)
         window = {"size": VARIANCE_WINDOW_PX, "mode": "constant"}
         freedom = uniform_filter(freedom.sum(axis=-1), **window)

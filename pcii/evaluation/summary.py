@@ -289,7 +289,7 @@ def with_yardsticks(frame: "DataFrame") -> "DataFrame":
     parts = [frame.drop(columns=[name for measures in names.values() for name in measures])]
     for prefix, measures in names.items():
         scores = frame[[*keys, *measures]].dropna(how="all", subset=[*measures])
-        scores = scores.drop_duplicates(["identity", "light", "z_mm"]).rename(columns=measures)
+        scores = scores.drop_duplicates(["identity", "light", "recipe", "z_mm"]).rename(columns=measures)
         nothing = scores.assign(method=NOTHING)
         nothing[[*measures.values()]] *= 0.0
         parts += [scores.assign(method=YARDSTICKS[prefix]), nothing]

@@ -19,7 +19,16 @@ from pcii.evidence import evidence_of_texture
 from pcii.metrics import TrueFocus
 from pcii.sections import depth_range_of, reconstruct
 from pcii.store import Collection, Dataset, Split, open_collection
-from pcii.types import COLOURS, CameraGrid, FocalPlanes, PhotonCounts, Truth, colour_index, total_disparity_px
+from pcii.types import (
+    PATTERNS,
+    CameraGrid,
+    FocalPlanes,
+    PhotonCounts,
+    Truth,
+    colour_cells,
+    colour_index,
+    total_disparity_px,
+)
 
 Field = Literal["counts", "sections", "evidence", "truth"]
 Example = dict[str, np.ndarray]
@@ -50,7 +59,8 @@ def examples(
     * "evidence": `evidence` (Z, H / 2, W / 2) float32, the evidence of texture at each plane in nats.
     * "truth": `z_mm` (H, W) float32, infinite where nothing is; `object_id` (H, W) int16; `in_focus`
       (Z, H, W) bool; `plane` (H, W) int64, the nearest plane, -1 where nothing is, what is counts in no
-      score, or all planes are farther than half the largest distance between two.
+      score, or all planes are farther than half the largest distance between two (of a single plane: is not
+      in it).
 
     `planes` are depths in mm, or a number of planes that are spread evenly in disparity over the depth range
     of each dataset. `split` takes the datasets of one split: that of a collection of drawn scenes (see
@@ -177,7 +187,8 @@ class _Pose:
         cfa = counts.cfa
         if cfa is not None:
             cells = self.of_map(colour_index(*grid.shape_HW, cfa))[:2, :2]
-            cfa = "".join(COLOURS[colour] for colour in cells.ravel())
+            rows, cols = (slice(size) for size in cells.shape)  # a film may be one pixel high or wide
+            cfa = next(name for name in PATTERNS if (colour_cells(name)[rows, cols] == cells).all())
         frames, bits = counts.readout.frames, counts.readout.bits
         return PhotonCounts.from_events(k, l, i, j, n, self.of_grid(grid), cfa=cfa, frames=frames, bits=bits)
 
@@ -208,7 +219,7 @@ def _thinned(
 def _truth_fields(truth: Truth, planes: FocalPlanes) -> Example:
     focus = TrueFocus(planes, truth)
     plane, off_px = focus.blur_px.argmin(axis=0), 2 * focus.blur_px.min(axis=0)
-    reach_px = np.diff(np.sort(total_disparity_px(planes.grid, planes.z_mm))).max() / 2
+    reach_px = np.diff(np.sort(total_disparity_px(planes.grid, planes.z_mm))).max(initial=0) / 2
     is_known = np.isfinite(truth.z_mm) & ~truth.is_unscored & (off_px <= reach_px)
     return {
         "z_mm": truth.z_mm.astype(np.float32),

@@ -226,13 +226,16 @@ def has_depths(dataset: Dataset, z_mm: Sequence[float] | None = None) -> bool:
 def planes_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> FocalPlanes:
     """Focal planes at the depths `z_mm`, else at those that the recipe suggests.
 
-    Raises `InputError` if there are none, or if no neighbouring views overlap at one: nothing is in focus.
+    Depths that are the same in six digits, as names of files and scores have them, are one plane. Raises
+    `InputError` if there are none, or if no neighbouring views overlap at one: nothing is in focus.
     """
     if not has_depths(dataset, z_mm):
         advice = "name depths with --z-mm, or a range with --z-range-mm"
         raise InputError(f"{dataset.path}: suggests no depths; {advice}")
     grid = dataset.grid
     planes = FocalPlanes.at_depths(grid, z_mm or dataset.analysis["z_mm"])
+    _, first = np.unique([f"{z:g}" for z in planes.z_mm], return_index=True)
+    planes = planes.take(np.sort(first))
     across, down = (np.abs(px) for px in disparity_px(grid, planes.z_mm))
     overlap = ((across < grid.width) & (grid.cols > 1)) | ((down < grid.height) & (grid.rows > 1))
     if grid.view_count > 1 and not overlap.all():

@@ -195,6 +195,16 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys) -> Non
     assert verify(tmp_path / "out") > 5
 
 
+def test_a_depth_named_twice_is_one_plane(tmp_path: Path) -> None:
+    save_dataset(tmp_path / "d", COUNTS, TRUTH, z_mm=[700, 500, 500.0001, 700], z_range_mm=(400, 900))
+    assert run("run", tmp_path / "d", "-o", tmp_path / "out", *FAST) == 0
+    found = json.loads((tmp_path / "out" / "score.json").read_text())
+    assert [(row["z_mm"], row["object"]) for row in found["planes"][::2]] == [(700, "card"), (500, "ball")]
+    assert run("evaluate", tmp_path / "d", "-o", tmp_path / "e", "--method", "brightness") == 0
+    rows = json.loads((tmp_path / "e" / "rows.jsonl").read_text())
+    assert [row["object"] for row in rows["planes"][::2]] == ["card", "ball"]
+
+
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
     # Surfaces without names, as in benchmarks of depth.
     save_dataset(tmp_path / "d", LIGHT, Truth(np.full((40, 48), 500.0), 0 * IDS, {}), z_mm=500)

@@ -279,6 +279,18 @@ def test_depth_has_no_levels_that_whole_shifts_would_give() -> None:
     assert np.sqrt(np.mean(np.square(error_px))) < 0.4
 
 
+def test_a_saturated_pixel_leaves_the_depth_of_the_others_as_it_is() -> None:
+    grid = unit_grid(1, 2, 40, 40)
+    wall = np.random.default_rng(5).poisson(wall_views(grid, (3.0, 3.0))[..., 0]).clip(max=30)
+    depths: list[np.ndarray] = []
+    for photons in (3, 31):
+        wall[0, 0, 20, 1] = photons  # the other camera does not see its voxels
+        counts = PhotonCounts.from_dense(wall, grid, frames=31, bits=1)
+        depths.append(estimate_depth(counts, RANGE_MM, method="variance-sweep").z_mm)
+    assert np.isfinite(depths[0][:, 15:]).mean() > 0.5
+    np.testing.assert_allclose(depths[1][:, 15:], depths[0][:, 15:])
+
+
 @pytest.mark.parametrize("method", ["sweep-17", "variance-sweep"])
 def test_brightness_alone_is_no_depth(method: str) -> None:
     # A mosaic whose colours differ much: where all shifts are even a voxel has samples of one colour only.

@@ -286,7 +286,14 @@ def test_depths_are_given_where_the_recipe_names_none(
     assert calls == []  # nothing is measured twice
     assert mean_of(evaluation, OWN, "by count", "iou").mean == pytest.approx(0.85)
     # Other depths are another scene, with figures of their own.
-    frame = evaluate([series], out, methods=["by count"], z_mm=[1]).frame
+    evaluate([series], out, methods=["by count"], z_mm=[1])
+    evaluation = evaluate([series], out, methods=["by count"], z_mm=[1, 2])
+    frame, means = evaluation.frame, evaluation.means()
+    is_yardstick = (means["method"] == "(everything)") & (means["measure"] == "iou") & (means["light"] == OWN)
+    # Both objects are nearest to the only plane: 20 of 96 pixels; else 10 at either.
+    assert means[is_yardstick].set_index("scene")["mean"].to_dict() == pytest.approx(
+        {"by hand (analysis.z_mm=[1.0])": 20 / 96, "by hand (analysis.z_mm=[1.0, 2.0])": 10 / 96}
+    )
     depths = frame.groupby("scene", observed=True)["z_mm"].unique().map(sorted).to_dict()
     assert depths == {"by hand (analysis.z_mm=[1.0])": [1], "by hand (analysis.z_mm=[1.0, 2.0])": [1, 2]}
 

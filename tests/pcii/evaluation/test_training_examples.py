@@ -64,6 +64,22 @@ def test_whole_films_are_mirrored_alone(dataset: Dataset) -> None:
     np.testing.assert_array_equal(plain[0]["counts"], dataset.counts.dense)
 
 
+def test_a_single_plane_has_what_lies_in_it(dataset: Dataset) -> None:
+    example = pcii.examples([dataset], ("truth",), planes=Z_MM[:1])[0]
+    np.testing.assert_array_equal(example["plane"], np.where(example["object_id"] == 1, 0, -1))
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (6, 1), (1, 1)])
+@pytest.mark.parametrize("cfa", ["GRBG", "BGGR"])
+def test_a_film_one_pixel_wide_keeps_its_colours(tmp_path: Path, shape: tuple[int, int], cfa: str) -> None:
+    grid, red = OPTICS.grid((2, 2, *shape)), colour_index(*shape, cfa) == 0
+    dense = np.broadcast_to(red, grid.shape_KLHW).astype(int)
+    made = pcii.save_dataset(tmp_path / "d", PhotonCounts.from_dense(dense, grid, cfa=cfa), z_range_mm=Z_MM)
+    found = pcii.examples([made], ("sections",), poses=True, seed=1)
+    for found.epoch in range(8):
+        assert not found[0]["sections"][:, 1:].any()  # neither green nor blue
+
+
 def test_light_is_thinned_anew(dataset: Dataset) -> None:
     found = pcii.examples([dataset], ("counts",), photons=(300, 300))
     totals = np.array([found[0]["counts"].sum() for _ in range(60)])
