@@ -63,8 +63,8 @@ class Evaluation:
     """What was measured of methods on datasets.
 
     `frame` has a row for each dataset, light, method and plane, or depth map; `pcii.evaluation.rows` lists
-    its columns. `made_again` is a sentence for each change of software for which earlier rows were measured
-    again. `origin` says what measured the rows: versions, machines and days.
+    its columns. `made_again` is a sentence for each change, of software or of suggested depths, for which
+    earlier rows were measured again. `origin` says what measured the rows: versions, machines and days.
     """
 
     folder: Path
@@ -127,7 +127,8 @@ def evaluate(
     those that recipes name. `executor` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
-    unless other software made them (see `pcii.store.provenance`). evaluation.html, means.csv and
+    unless other software made them (see `pcii.store.provenance`), or a dataset was made again with other
+    depths to look at. evaluation.html, means.csv and
     evaluation.json summarise the last row of each. The seconds of a row are the wall time of the method
     alone, after a warm-up call at the first dataset of each light; where several processes work at a time,
     each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
@@ -281,6 +282,8 @@ def _dataset_fields(dataset: Dataset, z_mm: Sequence[float]) -> Row:
         "seed": manifest.recipe.get("seed"),
         "settings": {name: value for name, value in settings.items() if name != "title"},
     }
+    if not settings:  # of images of others the identity does not say where to look
+        fields["analysis"] = {**dataset.analysis}
     if z_mm:
         fields["z_mm"] = fields["settings"]["analysis.z_mm"] = [*z_mm]
         fields["recipe"] = hash_json([recipe, *z_mm])[:16]
@@ -290,8 +293,8 @@ def _dataset_fields(dataset: Dataset, z_mm: Sequence[float]) -> Row:
 def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Report) -> tuple[str, ...]:
     """Add the rows of a job's tasks to those in the file, but for those that are there and still count.
 
-    Returns a sentence for each reason why rows are measured again: other software made them. Raises
-    `InputError` for a task that fails.
+    Returns a sentence for each reason why rows are measured again: other software made them, or the dataset
+    suggested other depths. Raises `InputError` for a task that fails.
     """
     tasks = job.tasks
     software = {task.method.name: software_of(task.method) for task in tasks}
@@ -299,10 +302,12 @@ def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Rep
     methods_by_change: dict[str, list[str]] = {}
     for number, task in enumerate(tasks):
         row, now = file.rows.get(task.key), software[task.method.name]
-        if row is None or now is None or row.get("software") != now:
+        has_moved = row is not None and row.get("analysis", task.dataset.analysis) != task.dataset.analysis
+        if row is None or now is None or row.get("software") != now or has_moved:
             pieces.append(number)
             if row is not None:
                 change = differences(row.get("software"), now)
+                change = "their datasets suggest other depths" if has_moved else change
                 methods_by_change.setdefault(change, []).append(task.method.name)
     if len(pieces) < len(tasks):
         report("scores of an earlier run", len(tasks) - len(pieces), len(tasks) - len(pieces))

@@ -78,6 +78,7 @@ class _Row(TypedDict):
     budget: NonNegativeFloat | Literal["full-light"] | None
     seed: NotRequired[float | None]
     settings: NotRequired[dict[str, Any]]
+    analysis: NotRequired[dict[str, Any]]
     z_mm: NotRequired[list[float]]
     photons_per_view: NotRequired[NonNegativeFloat | None]
     seconds: NotRequired[NonNegativeFloat | None]

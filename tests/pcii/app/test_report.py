@@ -16,6 +16,7 @@ import pytest
 from command_runs import run_pcii as run
 
 from pcii.app import Outcome, write_report
+from pcii.evaluation import evaluate
 from pcii.metrics import score
 from pcii.sections import depth_range_of, reconstruct
 from pcii.store import save_dataset, verify
@@ -203,6 +204,12 @@ def test_a_depth_named_twice_is_one_plane(tmp_path: Path) -> None:
     assert run("evaluate", tmp_path / "d", "-o", tmp_path / "e", "--method", "brightness") == 0
     rows = json.loads((tmp_path / "e" / "rows.jsonl").read_text())
     assert [row["object"] for row in rows["planes"][::2]] == ["card", "ball"]
+    (tmp_path / "d").rename(tmp_path / "other depths")
+    save_dataset(tmp_path / "d", COUNTS, TRUTH, z_mm=[500], z_range_mm=(400, 900))
+    for expected in (1, 0):
+        evaluation = evaluate([tmp_path / "d"], tmp_path / "e", methods=["brightness"])
+        assert evaluation.frame["z_mm"].unique().tolist() == [500]
+        assert len(evaluation.made_again) == expected
 
 
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
