@@ -249,8 +249,8 @@ def test_intervals_of_entropies_are_as_long_as_draws_of_the_photons_differ() -> 
     rng, where = np.random.default_rng(5), truth()
     light = 0.02 * (1 + np.arange(32) / 8) * np.ones(GRID.shape_KLHW)
     entropies, half_widths = [], []
-    for _ in range(40):
-        counts = PhotonCounts.from_dense(rng.poisson(light), GRID)
+    draws = [PhotonCounts.from_dense(rng.poisson(light), GRID) for _ in range(40)]
+    for counts in draws:
         sections = reconstruct(counts, Z)
         masks = Segmented(np.ones((2, 24, 32), dtype=bool), "all", sections)
         entropies.append([[*row["entropy"].values()] for row in score(masks, None, where).objects])
@@ -261,5 +261,6 @@ def test_intervals_of_entropies_are_as_long_as_draws_of_the_photons_differ() -> 
     assert ratio.min() > 0.5
     assert ratio.max() < 3
     # Of an object that is not scored there is neither.
-    half_scored = entropy_half_widths(counts, sections, replace(where, unscored=frozenset({1})))
+    of_other = replace(where, unscored=frozenset({1}))
+    half_scored = entropy_half_widths(draws[-1], reconstruct(draws[-1], Z), of_other)
     np.testing.assert_allclose([[*row.values()] for row in half_scored], half_widths[-1][1:], rtol=1e-12)
