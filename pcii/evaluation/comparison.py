@@ -306,8 +306,8 @@ def measure(job: "EvaluationJob", file: RowFile, executor: Executor, report: Rep
         if row is None or now is None or row.get("software") != now or has_moved:
             pieces.append(number)
             if row is not None:
-                change = differences(row.get("software"), now)
-                change = "their datasets suggest other depths" if has_moved else change
+                moved = "their datasets suggest other depths"
+                change = moved if has_moved else differences(row.get("software"), now)
                 methods_by_change.setdefault(change, []).append(task.method.name)
     if len(pieces) < len(tasks):
         report("scores of an earlier run", len(tasks) - len(pieces), len(tasks) - len(pieces))

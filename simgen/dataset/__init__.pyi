@@ -5,10 +5,9 @@ from .dataset_collection import generate_collection as generate_collection
 from .generation import generate as generate
 from .prepared import capture_of as capture_of, dark_map as dark_map, prepare as prepare
 from .prepared import prepare_scene as prepare_scene, Prepared as Prepared, sensitivities as sensitivities
-from .rendered_views import draw_counts as draw_counts, draw_from_views as draw_from_views
-from .rendered_views import exact_view as exact_view, fixed_totals as fixed_totals
-from .rendered_views import halved_view as halved_view
-from .rendered_views import write_counts as write_counts
 from .prepared import available_bytes as available_bytes, check_resources as check_resources
 from .prepared import in_bytes as in_bytes, peak_bytes as peak_bytes, product_bytes as product_bytes
 from .prepared import shortage as shortage
+from .rendered_views import draw_counts as draw_counts, draw_from_views as draw_from_views
+from .rendered_views import exact_view as exact_view, fixed_totals as fixed_totals
+from .rendered_views import halved_view as halved_view, write_counts as write_counts

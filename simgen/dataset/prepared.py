@@ -47,7 +47,7 @@ TILE_BYTES = 110.0
 """A tile of the majorant."""
 EVENT_BYTES, FRAME_BYTES, TRUTH_BYTES = 16.0, 2.0, 6.0
 """On disk before compression: a pixel that caught photons, the frame of each, its depth and object."""
-EXR_SHARE = 0.5
+MIN_COMPRESSED_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
 
@@ -330,7 +330,7 @@ def product_bytes(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
         frames = FRAME_BYTES * photons * (products.frames and recipe.sensor.frames > 1)
         sizes["counts"] = EVENT_BYTES * min(photons, pixels * views) + frames
     if products.radiance != "none":
-        sizes["radiance"] = least_rendered_bytes(recipe, None) / EXR_SHARE
+        sizes["radiance"] = least_rendered_bytes(recipe, None) / MIN_COMPRESSED_SHARE
     if products.truth or products.view_truth:
         sizes["truth"] = TRUTH_BYTES * pixels * (products.truth + views * bool(products.view_truth))
     return sizes
@@ -341,7 +341,7 @@ def least_rendered_bytes(recipe: Recipe, plan: Plan | None) -> float:
     if recipe.products.radiance == "none" and (plan is None or plan.thins):
         return 0.0
     pixels = float(recipe.grid.height * recipe.grid.width * recipe.grid.rows * recipe.grid.cols)
-    return EXR_SHARE * 4.0 * pixels * (3 if recipe.products.radiance == "rgb" else 1)
+    return MIN_COMPRESSED_SHARE * 4.0 * pixels * (3 if recipe.products.radiance == "rgb" else 1)
 
 
 def available_bytes() -> float:

@@ -58,7 +58,7 @@ def assorted(random: Random) -> Scene:
         place = 0.0, 60.0, random.uniform(690, 780)
         objects.add("ground", place, turned, shape_of("card", 900, 900), _any_material(random, 2048))
     luminances = [log_uniform(random, 500, 4000), log_uniform(random, 40, 400)]
-    return _lit(random, "Assorted things", objects, [near, middle, far], luminances)
+    return _illuminate(random, "Assorted things", objects, [near, middle, far], luminances)
 
 
 def screens(random: Random) -> Scene:
@@ -85,7 +85,7 @@ def screens(random: Random) -> Scene:
         place = 0.0, 0.0, random.uniform(690, 780)
         objects.add("wall", place, UPRIGHT, shape_of("card", 900, 900), _any_material(random, 2048))
     luminances = [2000, log_uniform(random, 60, 300)]
-    return _lit(random, "Things behind bars", objects, [near, far], luminances)
+    return _illuminate(random, "Things behind bars", objects, [near, far], luminances)
 
 
 def furnished(random: Random) -> Scene:
@@ -124,7 +124,7 @@ def furnished(random: Random) -> Scene:
         name = f"{'standing' if stands else 'hanging'}-{number}"
         objects.add(name, (x, y, z + behind), turned, shape, _any_material(random))
     named = [*planes, wall] if random.random() < 0.5 else planes
-    return _lit(random, "A furnished room", objects, named)
+    return _illuminate(random, "A furnished room", objects, named)
 
 
 def heap(random: Random) -> Scene:
@@ -149,7 +149,7 @@ def heap(random: Random) -> Scene:
             material = material | {"reflectance": own_colour}
         objects.add(f"{kind}-{number}", place, turned, shape, material)
     _add_backwall(random, objects, planes[-1])
-    return _lit(random, "A heap", objects, planes)
+    return _illuminate(random, "A heap", objects, planes)
 
 
 def pickets(random: Random) -> Scene:
@@ -167,7 +167,7 @@ def pickets(random: Random) -> Scene:
         place = random.uniform(-100, 100), random.uniform(-80, 80), z + behind - 1.0
         objects.add(f"thing-{number}", place, _any_turn(random), shape, material(random))
     _add_backwall(random, objects, max(others))
-    return _lit(random, "Narrow things", objects, [near, *others])
+    return _illuminate(random, "Narrow things", objects, [near, *others])
 
 
 def plain_pair(random: Random) -> Scene:
@@ -181,7 +181,7 @@ def plain_pair(random: Random) -> Scene:
         objects.add(f"plain-{number}", place, _any_turn(random), shape, parts.plain(random))
     if random.random() < 0.3:
         _add_wall(random, objects, random.uniform(planes[-1] + 60, 850), parts.plain)
-    return _lit(random, "Large plain things", objects, planes)
+    return _illuminate(random, "Large plain things", objects, planes)
 
 
 def leaning(random: Random) -> Scene:
@@ -208,7 +208,7 @@ def leaning(random: Random) -> Scene:
         turned = random.uniform(-90, -70), random.uniform(-15, 15), 0.0
         objects.add("floor", place, turned, shape_of("card", 900, 420), _large_material(random))
     _add_backwall(random, objects, 760)
-    return _lit(random, "Leaning things", objects, planes)
+    return _illuminate(random, "Leaning things", objects, planes)
 
 
 def glazed(random: Random) -> Scene:
@@ -228,7 +228,7 @@ def glazed(random: Random) -> Scene:
         if has_glass and number < 2:
             material = {"finish": {"type": "glass", "refractive_index": round(random.uniform(1.3, 1.8), 2)}}
         objects.add(f"glazed-{number}", place, _any_turn(random), shape, material)
-    return _lit(random, "Glass and gloss", objects, planes)
+    return _illuminate(random, "Glass and gloss", objects, planes)
 
 
 def meshes(random: Random) -> Scene:
@@ -246,7 +246,7 @@ def meshes(random: Random) -> Scene:
         material = random.choice([parts.plain, _any_material, _any_material, parts.glossy])(random)
         objects.add(f"{kind}-{number}", place, rotation, parts.mesh_of(make(random), size), material)
     _add_backwall(random, objects, planes[-1])
-    return _lit(random, "Curved things", objects, planes)
+    return _illuminate(random, "Curved things", objects, planes)
 
 
 def empty_wall(random: Random) -> Scene:
@@ -257,7 +257,7 @@ def empty_wall(random: Random) -> Scene:
     objects = Objects()
     objects.add("wall", (0.0, 0.0, wall), turned, shape_of("card", 1200, 1200), material)
     away = [plane for plane in range(440, 761) if abs(TOTAL_PX_MM / plane - TOTAL_PX_MM / wall) > 13]
-    return _lit(random, "An empty wall", objects, [random.choice(away)])
+    return _illuminate(random, "An empty wall", objects, [random.choice(away)])
 
 
 def _add_narrow_things(random: Random, objects: Objects, z_mm: float) -> None:
@@ -379,7 +379,7 @@ def _plane_depths(random: Random, count: int, nearest_gap_px: float = GAP_PX[0])
     return sorted(round(TOTAL_PX_MM / total) for total in totals)
 
 
-def _lit(
+def _illuminate(
     random: Random,
     title: str,
     objects: Objects,

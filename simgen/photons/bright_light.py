@@ -180,7 +180,7 @@ def lit_light(
     least_radiance = brightest_that_matters(film_light, paths, capture.pixels)
     rows, samples = list[BrightLight](), [nothing(capture.channels).exceeding]
     seed = seeds.integer(EXPLORATION_SEED, stage="lamp rays")
-    for point_mm, normal, area_mm2 in tracer.lit_places(LIT_POINTS, seed):
+    for point_mm, normal, area_mm2 in tracer.find_lit_places(LIT_POINTS, seed):
         view = np.arange(area_mm2.size) % capture.grid.view_count
         k, l = np.divmod(view, capture.grid.cols)
         away_mm = point_mm - capture.rig.position_mm[k, l]

@@ -136,7 +136,7 @@ class LampTracer:
         scale_px = self.rig.grid.focal_mm / self.rig.grid.pixel_mm
         return scale_px**2 / (np.pi * (self.disc_mm * self.render_scene.frame.unit) ** 2)
 
-    def lit_places(self, number: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def find_lit_places(self, number: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """What each lamp that stands at a point, as a spot lamp, lights first, by `number` of its rays.
 
         Places (N, 3) in mm, their unit normals (N, 3) on its side, and the area (N,) in mm^2 of each.

@@ -67,7 +67,7 @@ class Light:
         self.mi, self.cfa = mi, cfa
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
-        """A `wavelength_sample` of each of so many pixels; zeros where there are no wavelengths."""
+        """A `wavelength_sample` of each of `number` pixels; zeros where there are no wavelengths."""
         return load_drjit().zeros(self.mi.Float, number)
 
     def aim(self, ray: Any, pixels: Any) -> Any:
